@@ -6,6 +6,7 @@ import pytest
 
 import vibrokit as vk
 from tests.analyzers.graph import linear
+from tests.scenes import scene
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.shooting import Shooting
@@ -82,16 +83,10 @@ def test_the_same_bits_on_every_run(paper, domain):
 @pytest.mark.parametrize(
     "bad",
     [
-        {"radius": 0.0},
-        {"radius": float("nan")},
-        {"radius": "small"},
-        {"points": 2},
-        {"points": 1.5},
-        {"rounds": -1},
-        {"tolerance": 0.0},
-        {"budget": 0},
+        {"radius": 0.0}, {"radius": float("nan")}, {"radius": "small"}, {"points": 2}, {"points": 1.5}, {"rounds": -1},
+        {"tolerance": 0.0}, {"budget": 0},
     ],
-)
+)  # fmt: skip
 def test_bad_settings(bad):
     with pytest.raises(StructureError, match=next(iter(bad))):
         vk.ActionPlot(**bad)
@@ -172,35 +167,25 @@ class Interrupt:
             raise KeyboardInterrupt
 
 
-def test_an_interrupt_of_the_first_grid_leaves_nothing(paper):
-    osc, structure = paper
-    result = vk.ActionPlot(points=300).run(osc, structure, progress=Interrupt("action plot", 1))
-    assert result.energies == ()
-    assert not result.complete
+def interrupted(paper, stage, count, **settings):
+    result = vk.ActionPlot(**settings).run(*paper, progress=Interrupt(stage, count))
     assert result.found(Code.STOPPED)
-
-
-def test_an_interrupt_of_the_refinement_keeps_the_rounds_before(paper):
-    osc, structure = paper
-    result = vk.ActionPlot(points=1000, source=0).run(osc, structure, progress=Interrupt("action plot", 3000))
-    (stopped,) = result.found(Code.STOPPED)
-    assert stopped.values == {"stage": "action plot", "reason": "interrupt"}
     assert not result.complete
-    (energy,) = result.energies
-    (shots,) = result.found(Code.SHOTS)
+    return result
+
+
+def test_an_interrupt_keeps_what_was_finished(paper):
+    """Nothing of the first grid; the rounds before; the paths without their errors."""
+    assert interrupted(paper, "action plot", 1, points=300).energies == ()
+    refining = interrupted(paper, "action plot", 3000, points=1000, source=0)
+    (energy,), (shots,), (stopped,) = refining.energies, refining.found(Code.SHOTS), refining.found(Code.STOPPED)
+    assert stopped.values == {"stage": "action plot", "reason": "interrupt"}
     assert 1000 <= shots.values["paths"] <= 3000
     assert math.isnan(energy.numerical_error)  # the error would take another integration
     assert energy.upper == energy.value
-
-
-def test_an_interrupt_of_the_errors_keeps_the_paths(paper):
-    osc, structure = paper
-    listener = Interrupt("errors of the action plot", 1)
-    result = vk.ActionPlot(points=300, rounds=3, source=0).run(osc, structure, progress=listener)
-    whole = vk.ActionPlot(points=300, rounds=3, source=0).run(osc, structure)
-    assert [energy.value for energy in result.energies] == [energy.value for energy in whole.energies]
-    assert result.found(Code.STOPPED)
-    assert not result.complete
+    estimating = interrupted(paper, "errors of the action plot", 1, points=300, rounds=3, source=0)
+    whole = vk.ActionPlot(points=300, rounds=3, source=0).run(*paper)
+    assert [energy.value for energy in estimating.energies] == [energy.value for energy in whole.energies]
 
 
 @pytest.mark.parametrize("kind", ["chaotic", "quasiperiodic", "limit cycle"])
@@ -238,13 +223,8 @@ def test_too_little_work_is_a_finding(paper):
 @pytest.mark.slow
 def test_first_contact_of_the_linear_scene():
     """ΔU = 2ζω_n³ (b − max x_s)², x_s the forced steady state; one attractor is enough."""
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.05,
-        barriers=(vk.Barrier(vk.Hertz(stiffness=50.0), 1.0, "right"),),
-        excitations=(vk.Harmonic(0.3, 0.57),),
-        noise=vk.WhiteNoise(1e-3),
-    )
+    forced = {"excitations": (vk.Harmonic(0.3, 0.57),), "noise": vk.WhiteNoise(1e-3)}
+    osc = scene(vk.Barrier(vk.Hertz(stiffness=50.0), 1.0, "right"), damping_ratio=0.05, **forced)
     structure = vk.find_structure(osc, cells=(20, 20), starts=(4, 4), saddles=False, manifolds=False)
     clear = next(a for a in structure.attractors if a.impacts == 0)
     energy = vk.ActionPlot(points=2000, source=clear.label, exit=vk.FirstContact()).run(osc, structure).energies[0]

@@ -110,11 +110,16 @@ def test_a_density_that_is_too_narrow_for_the_nodes_is_reported():
     np.testing.assert_allclose(found.mass, 1.0, rtol=1e-9)
 
 
-def test_a_time_limit_keeps_what_was_reached():
-    limited = vk.evolve_density(LINEAR, REGION, (1, 2000), nodes=(60, 60), steps=16, time_limit=0.5)
-    assert not limited.complete
-    assert len(limited.times) == 1
-    assert limited.found(vk.Code.STOPPED)
+def test_what_was_reached_before_a_stop_is_kept():
+    def interrupt(update):
+        if update.stage == "density" and update.done >= 2 and not update.finished:
+            raise KeyboardInterrupt
+
+    for stop, reached in (({"progress": interrupt}, 1), ({"time_limit": 1e-4}, 0)):
+        stopped = vk.evolve_density(LINEAR, REGION, (1, 2000), nodes=(40, 40), steps=8, **stop)
+        assert not stopped.complete
+        assert len(stopped.times) == reached
+        assert stopped.found(vk.Code.STOPPED)
 
 
 @pytest.mark.parametrize(

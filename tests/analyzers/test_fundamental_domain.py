@@ -59,13 +59,13 @@ def test_each_orbit_enters_once(damping):
     count = len(made.shells)
     step = PERIOD / count
     slow, fast = damping - math.sqrt(max(damping**2 - 1, 0)), damping + math.sqrt(max(damping**2 - 1, 0))
-    back, ahead = math.ceil(math.log(1e3) / slow / step), math.ceil(math.log(1e3) / slow / step)
+    around = math.ceil(math.log(1e3) / slow / step)
     angle = np.random.default_rng(1).uniform(0, 2 * np.pi, 200)
     length = RADIUS * 10 ** np.random.default_rng(2).uniform(-1, 1, 200) * math.sqrt(1 / (4 * damping))
     paths = length * np.stack([np.cos(angle), np.sin(angle)])
-    assert fast * ahead * step < 300  # no overflow
+    assert fast * around * step < 300  # no overflow
     entered = np.zeros(200, dtype=int)
-    for k in range(-back, ahead):
+    for k in range(-around, around):
         shell = made.shells[k % count]
         fractions = fractions_of(shell, shell.point + (growth(damping, k * step) @ paths).T)
         entered += (fractions >= 0) & (fractions < 1)

@@ -53,18 +53,12 @@ def beside(orbit, phase, leaving):
 
 
 @pytest.mark.parametrize("phase", [0, 3])
-def test_what_follows_a_point_in_the_stable_space(orbit, phase):
-    point, count = beside(orbit, phase, leaving=False), 11
-    expected = solved(orbit, point, phase, count)
-    found = np.vstack([point, orbit.continued(point, phase, count)])
-    np.testing.assert_allclose(found, expected, atol=50 * SMALL**2)
-
-
-@pytest.mark.parametrize("phase", [0, 3])
-def test_what_comes_before_a_point_in_the_unstable_space(orbit, phase):
-    point, count = beside(orbit, phase, leaving=True), 11
-    found = np.vstack([orbit.continued(point, phase, -count), point])
-    expected = solved(orbit, found[0], phase - count, count)
+@pytest.mark.parametrize("leaving", [False, True])
+def test_what_follows_a_point_in_the_stable_space_or_comes_before_one_in_the_unstable_space(orbit, phase, leaving):
+    point, count = beside(orbit, phase, leaving), 11
+    more = orbit.continued(point, phase, -count if leaving else count)
+    found = np.vstack([more, point] if leaving else [point, more])
+    expected = solved(orbit, found[0], phase - count * leaving, count)
     np.testing.assert_allclose(found, expected, atol=50 * SMALL**2)
 
 

@@ -42,9 +42,6 @@ def codes(found):
     return {finding.code for finding in found.findings}
 
 
-# --- noise given as a formula
-
-
 def test_a_constant_amplitude_given_as_a_formula_is_white_noise(structure, result):
     """√D g dW with g = 2 is white noise of intensity 4 D; the two runs have different random numbers."""
     osc = dataclasses.replace(WELL, noise=vk.StateDependentNoise(0.01, "g", g=2.0))
@@ -277,17 +274,11 @@ def test_killed_at_any_moment_it_goes_on_with_the_same_bits(structure, tmp_path)
     assert vk.load_result(tmp_path / "resumed.nc").data.identical(whole.data)
 
 
-def test_a_resumed_run_repeats_nothing(structure, tmp_path):
-    analyzer = vk.MFET(intensities=(0.05,), **QUICK)
-    first = analyzer.run(WELL, structure, checkpoint=tmp_path / "work.ckpt")
-    again = analyzer.run(WELL, structure, checkpoint=tmp_path / "work.ckpt")
+def test_a_resumed_run_repeats_nothing_and_other_checkpoints_are_refused(structure, tmp_path):
+    place, analyzer = tmp_path / "work.ckpt", vk.MFET(intensities=(0.05,), **QUICK)
+    first, again = (analyzer.run(WELL, structure, checkpoint=place) for _ in range(2))
     assert again.data.identical(first.data)
     assert again.stats.intervals < 0.5 * first.stats.intervals
-
-
-def test_checkpoints_that_are_refused(structure, tmp_path):
-    place = tmp_path / "work.ckpt"
-    vk.MFET(intensities=(0.05,), **QUICK).run(WELL, structure, checkpoint=place)
     for other in (
         vk.MFET(intensities=(0.05,), seed=1, **QUICK), vk.MFET(intensities=(0.06,), **QUICK),
         vk.MFET(intensities=(0.05,), stepper=vk.RK4(512), **QUICK),
@@ -298,7 +289,7 @@ def test_checkpoints_that_are_refused(structure, tmp_path):
     for damaged in (content[:-7], content[:40], b"", b"x" * 1000):
         place.write_bytes(damaged)
         with pytest.raises(CheckpointError):
-            vk.MFET(intensities=(0.05,), **QUICK).run(WELL, structure, checkpoint=place)
+            analyzer.run(WELL, structure, checkpoint=place)
     with pytest.raises(StructureError, match="checkpoint"):
         vk.ActionGraph().run(WELL, structure, checkpoint=tmp_path / "other.ckpt")
     with pytest.raises(FileError, match="folder"):

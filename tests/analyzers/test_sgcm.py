@@ -83,10 +83,17 @@ def test_result_is_saved_and_reopened(result, tmp_path):
     assert again.plot().ax.get_xlabel()
 
 
-def test_a_grid_that_cannot_resolve_the_density_is_refused_with_the_nodes_it_needs(structure):
-    found = vk.SGCM(source=0, intensities=(1e-5,), nodes=(40, 40), steps=8).run(WELL, structure)
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ({"intensities": (1e-5,), "nodes": (40, 40), "steps": 8}, "needs"),  # so many nodes
+        ({"nodes": (400, 400), "max_memory_gib": 1e-3}, "GiB"),
+    ],
+)
+def test_a_grid_that_cannot_resolve_the_density_or_is_too_large_is_refused(structure, settings, reason):
+    found = vk.SGCM(source=0, **settings).run(WELL, structure)
     (failed,) = found.found(vk.Code.SOURCE_FAILED)
-    assert "needs" in failed.values["reason"]
+    assert reason in failed.values["reason"]
     assert not found.energies
 
 
@@ -154,17 +161,16 @@ def test_noise_is_weak_against_the_intensities_of_the_method_not_of_the_scene(st
     assert not quiet.found(vk.Code.NOISE_NOT_WEAK)
 
 
-def test_too_little_memory(structure):
-    found = vk.SGCM(source=0, nodes=(400, 400), max_memory_gib=1e-3).run(WELL, structure)
-    (failed,) = [finding for finding in found.findings if finding.code is vk.Code.SOURCE_FAILED]
-    assert "GiB" in failed.values["reason"]
-
-
 @pytest.mark.slow
-def test_noise_with_states_of_its_own(structure):
+def test_scenes_that_are_refused():
     coloured = WELL.replace(noise=Coloured(intensity=1e-3, rate=2.0))
-    with pytest.raises(vk.errors.SceneError, match="3 dimensions"):
-        vk.SGCM().run(coloured, vk.find_structure(coloured, cells=(20, 20), manifolds=False, rng=0))
+    one_attractor = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=1e-3))
+    for osc, error, words in (
+        (coloured, vk.errors.SceneError, "3 dimensions"),
+        (one_attractor, vk.errors.StructureError, "only one attractor"),
+    ):
+        with pytest.raises(error, match=words):
+            vk.SGCM(nodes=(40, 40)).run(osc, vk.find_structure(osc, cells=(20, 20), manifolds=False, rng=0))
 
 
 class LeaveStrip(vk.LeaveRegion):
@@ -193,9 +199,3 @@ def test_an_equilibrium_alone_is_left_by_position():
     assert not beyond_the_density.energies
     (failed,) = left_by_position(vk.StateDependentNoise(1e-2, "v")).found(vk.Code.SOURCE_FAILED)
     assert "noise is 0" in failed.values["reason"]
-
-
-def test_one_attractor_has_nowhere_to_go():
-    osc = scene(damping_ratio=0.2, noise=vk.WhiteNoise(intensity=1e-3))
-    with pytest.raises(vk.errors.StructureError, match="only one attractor"):
-        vk.SGCM(nodes=(40, 40)).run(osc, vk.find_structure(osc, cells=(20, 20), rng=0))
