@@ -38,13 +38,9 @@ The trapezoidal rule is exact to 1e-4 there, and its errors change sign from nod
 SMOOTH, ROUGH, EMPTY = 0, 1, 2
 """What a quintic would reach: a smooth φ, a rough one, or none above the floor."""
 _JUMP = 3.0  # in φ between neighbouring nodes: beyond it p, not ln p, is interpolated linearly if φ is rough
-_REACH = 10.0  # spreads on each side of a density that diffusion may reach
 _NEGLIGIBLE = 40.0  # in the exponent: e⁻⁴⁰ of a sum is less than its rounding errors
 _UNDERFLOW = 600.0  # in the exponent: sums over a row are taken relative to its maximum, in floating point
-_CUT = 1.0  # in φ: the flow compresses areas by less in a step, so that what is at the floor stays there
 _SMALLEST = 1e-280  # sums below it may have lost terms to underflow
-_ITERATIONS = 40
-_NARROWEST = 0.3  # 1 − s²φ″ in the closed form: it is less only where p has a cusp below the spread
 _SERIES = 0.05  # below it, ln(1 − x) is a series of eight terms, whose error is less than 1e-12
 
 Array = NDArray[np.float64]
@@ -59,20 +55,13 @@ def _rough(a: float, b: float) -> bool:
     return abs(a - b) > ROUGH_RATIO * (smaller if a * b > 0.0 else 0.0) + ROUGH_CHANGE
 
 
-@njit(nogil=True, cache=True, error_model="numpy", inline="always")
-def _cubic(before: float, left: float, right: float, after: float, place: float) -> float:
-    """The cubic through four nodes, at a place from 0 to 1 between the two in the middle."""
-    low, high = before - 2.0 * left + right, left - 2.0 * right + after
-    bend = (2.0 - place) * low + (1.0 + place) * high
-    return left + place * (right - left) - place * (1.0 - place) / 6.0 * bend
-
-
 @njit(nogil=True, cache=True, error_model="numpy")
 def _between(before: float, left: float, right: float, after: float, place: float) -> float:
     """Interpolate φ between two nodes, at a place from 0 to 1, with limits where φ is rough."""
     low, high = before - 2.0 * left + right, left - 2.0 * right + after
-    if not _rough(low, high):
-        return _cubic(before, left, right, after, place)
+    if not _rough(low, high):  # the cubic through the four nodes
+        bend = (2.0 - place) * low + (1.0 + place) * high
+        return left + place * (right - left) - place * (1.0 - place) / 6.0 * bend
     step = abs(right - left)
     if step > _JUMP and step > 4.0 * min(abs(left - before), abs(after - right)) + 1.0:
         top, bottom = max(left, right), min(left, right)
@@ -182,7 +171,7 @@ def _matched(spread: float) -> float:
     variance is 0.08 in place of 0.16 at 0.4.
     """
     found = spread
-    for _ in range(_ITERATIONS):
+    for _ in range(40):
         weights, variance = 1.0, 0.0
         for k in range(1, int(6.0 * found) + 3):
             weight = 2.0 * math.exp(-0.5 * (k / found) ** 2)
@@ -317,8 +306,8 @@ def _closed_row(
             out[j] = row[j]
             summed[j] = False
         elif low <= j <= high and spread <= WIDEST and not (rough[j - 1] or rough[j]):
-            narrowing = 1.0 - curvatures[j]
-            summed[j] = narrowing < _NARROWEST
+            narrowing = 1.0 - curvatures[j]  # less than this only where p has a cusp below the spread
+            summed[j] = narrowing < 0.3
             if abs(curvatures[j]) > _SERIES and not summed[j]:
                 slope = (8.0 * (row[j + 1] - row[j - 1]) - (row[j + 2] - row[j - 2])) / 12.0
                 out[j] = row[j] + 0.5 * ((spread * slope) ** 2 / narrowing - math.log(narrowing))
@@ -370,51 +359,23 @@ def parts_of(widest: float) -> int:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def step_rows(
-    phi: Array,
-    marks: Marks,
-    feet: Array,
-    growth: Array,
-    share: Array,
-    value: float,
-    weight: Array,
-    spreads: Array,
-    parts: int,
-    floor: float,
-    out: Array,
-    out_marks: Marks,
-    taken: Array,
+    phi: Array,  # (nx, nv)
+    marks: Marks,  # (nx, nv): what a quintic would reach, as an earlier call left it in `out_marks`, or `mark_rows`
+    feet: Array,  # (nx, nv, 2): where φ is taken from for each node, in node spacings; NaN if it is nowhere
+    growth: Array,  # (nx, nv): added to it
+    share: Array,  # (nx, nv) or (0, 0): how much an exit takes up after the flow, from 0 to below 1
+    value: float,  # φ of what it takes up, after that: −∞ for a density, 0 for an expected value that is 1 at the exit
+    weight: Array,  # (nx, nv) or (0, 0): added to φ while it diffuses
+    spreads: Array,  # (nx, nv): spread of the velocity by the noise in each part, in node spacings
+    parts: int,  # how often that diffusion is applied, see `parts_of`
+    floor: float,  # φ outside the grid, and the least φ inside
+    out: Array,  # (last - first, nv): φ in the rows from first to last
+    out_marks: Marks,  # (last - first, nv): what a quintic would reach there
+    taken: Array,  # (last - first,): ln of the sum of e^φ over each row that the exit takes up
     first: int,
     last: int,
 ) -> None:
-    """Apply the flow and then diffusion to rows of φ.
-
-    Parameters
-    ----------
-    phi : array (nx, nv)
-    marks : uint8 array (nx, nv)
-        What a quintic would reach, as an earlier call left it in `out_marks`, or `mark_rows`.
-    feet : array (nx, nv, 2)
-        Where φ is taken from for each node, in node spacings; NaN if it is nowhere.
-    growth : array (nx, nv)
-        Added to it.
-    share : array (nx, nv) or (0, 0)
-        How much an exit takes up after the flow, from 0 to below 1.
-    value : float
-        φ of what it takes up, after that: −∞ for a density, 0 for an expected value that is 1 at the exit.
-    weight : array (nx, nv) or (0, 0)
-        Added to φ while it diffuses.
-    spreads : array (nx, nv)
-        Standard deviation of the velocity that noise adds in each part, in node spacings.
-    parts : int
-        How often that diffusion is applied, see `parts_of`.
-    floor : float
-        φ outside the grid, and the least φ inside.
-    out, out_marks : arrays (last - first, nv)
-        φ in the rows from `first` to `last`, and what a quintic would reach there.
-    taken : array (last - first,)
-        ln of the sum of e^φ over each row that the exit takes up.
-    first, last : int
-    """
+    """Apply the flow and then diffusion to rows of φ."""
     nv = phi.shape[1]
     row, other, curvatures = np.empty(nv), np.empty(nv), np.empty(nv)
     weights, of = np.empty(nv), np.zeros(3)
@@ -428,7 +389,8 @@ def step_rows(
             continue
         if len(weight) > 0:
             row += weight[i]
-        reach = int(_REACH * max(spreads[i].max(), 0.5)) + 1
+        # spreads on each side of a density that diffusion may reach
+        reach = int(10.0 * max(spreads[i].max(), 0.5)) + 1
         for _ in range(max(parts, 1)):
             from_node, to_node = max(low - reach, 0), min(high + reach, nv - 1)
             _mark_row(row, from_node - 1, to_node, rough)
@@ -439,5 +401,6 @@ def step_rows(
         for j in range(nv):
             lighter = weight[i, j] if len(weight) > 0 else 0.0
             left = row[j] - lighter
-            out[i - first, j] = left if left > floor + _CUT else floor
+            # The flow compresses areas by less than e in a step, so that what is at the floor stays there.
+            out[i - first, j] = left if left > floor + 1.0 else floor
     mark_rows(out, floor, out_marks)

@@ -9,6 +9,7 @@ import bisect
 import functools
 import math
 import types
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, grey_opening
 
 from vibrokit.kernels.fixed_steps import RK4
-from vibrokit.kernels.kernel import first_call, kernel_for, theta_of
+from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.parts.excitation import Constant, Excitation, Harmonic
 from vibrokit.parts.scene import Scene
@@ -88,24 +89,22 @@ def contact_times(scene: Scene, flow: Flow) -> tuple[ContactTime, ...]:
     """Estimate the contact with each stop at a typical impact speed; very soft stops are left out.
 
     The greatest depth follows from the energy, ½v² = ∫ F dδ, and the duration is close to π·depth/v for every power.
-    The law is that of the kernel for lanes, which an ensemble needs anyway. Raises StepperError if RK4 cannot integrate
-    this flow of this scene.
+    The formulas are those of the kernel for lanes, which an ensemble needs anyway, called as Python: a few thousand
+    values take less time than compiling them. Raises StepperError if RK4 cannot integrate this flow of this scene.
     """
     if not scene.barriers:
         return ()
-    module, theta = kernel_for(scene, flow, RK4()).module, theta_of(scene)
-    with first_call(module.law):
-        module.law(0, 0.0, 0.0, theta)
+    module, theta = kernel_for(scene, flow, RK4()).module, theta_of(scene).tolist()
     reach, speed = _typical_motion(scene, module, theta)
     found = (_contact(module, theta, stop, reach, speed) for stop in range(len(scene.barriers)))
     return tuple(contact for contact in found if contact is not None)
 
 
-def _contact(module: types.ModuleType, theta: Array, stop: int, reach: float, speed: float) -> ContactTime | None:
+def _contact(module: types.ModuleType, theta: list[float], stop: int, reach: float, speed: float) -> ContactTime | None:
     depths = reach * _DEPTHS
     shortest = None
     for rate in (0.0, speed, -speed):  # a law that damps is stiffer on the way in, backwards in time on the way out
-        force = np.array([module.law(stop, depth, rate, theta) for depth in depths])
+        force = np.array([_force(module.law.py_func, stop, depth, rate, theta) for depth in depths.tolist()])
         force = np.clip(np.nan_to_num(force), 0.0, 1e100)
         per_fold = force * depths  # dδ = δ d(ln δ) on this grid
         work = np.cumsum(0.5 * (per_fold[1:] + per_fold[:-1]) * np.diff(np.log(depths)))
@@ -121,7 +120,17 @@ def _contact(module: types.ModuleType, theta: Array, stop: int, reach: float, sp
     return shortest
 
 
-def _typical_motion(scene: Scene, module: types.ModuleType, theta: Array) -> tuple[float, float]:
+def _force(law: Callable[..., float], stop: int, depth: float, rate: float, theta: list[float]) -> float:
+    """The force of a stop; infinite where it is out of range, NaN where it has no real value."""
+    try:
+        return float(law(stop, depth, rate, theta))
+    except OverflowError:
+        return math.inf
+    except (ArithmeticError, TypeError, ValueError):  # a power may be complex
+        return math.nan
+
+
+def _typical_motion(scene: Scene, module: types.ModuleType, theta: list[float]) -> tuple[float, float]:
     """Largest displacement and speed: of the linear response to the forcing, or those needed to reach a stop."""
     own = scene.natural_frequency
     stiffness = scene.spring.stiffness if isinstance(scene.spring, LinearSpring) else own**2
@@ -141,12 +150,12 @@ def _typical_motion(scene: Scene, module: types.ModuleType, theta: Array) -> tup
     return reach, speed
 
 
-def _harmonics(scene: Scene, module: types.ModuleType, theta: Array) -> tuple[Array, Array]:
+def _harmonics(scene: Scene, module: types.ModuleType, theta: list[float]) -> tuple[Array, Array]:
     """Angular frequencies of the forcing over one interval, and their amplitudes."""
     if not module.FORCED:
         return np.zeros(0), np.zeros(0)
     unit, samples = scene.time_unit, 128
-    values = np.array([module.forcing(unit * sample / samples, theta) for sample in range(samples)])
+    values = np.array([module.forcing.py_func(unit * sample / samples, theta) for sample in range(samples)])
     sizes = np.asarray(np.abs(np.fft.rfft(values)) * (2.0 / samples), dtype=np.float64)
     sizes[0] /= 2.0
     sizes[sizes < 1e-9 * sizes.max()] = 0.0  # rounding, which a resonance would amplify

@@ -49,10 +49,6 @@ class VectorField:
 
     The force of a stop is that at positive depth. At depth 0 and below a stop does not push, so the Jacobian there is
     that of the free motion.
-
-    Parameters
-    ----------
-    scene : Scene
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -61,18 +57,7 @@ class VectorField:
         self._modules: dict[Flow, types.ModuleType] = {}
 
     def rate(self, states: Array, time: float | Array = 0.0) -> Array:
-        """Return b(q, t).
-
-        Parameters
-        ----------
-        states : array (…, n)
-        time : float or array (…)
-            In s.
-
-        Returns
-        -------
-        array (…, n)
-        """
+        """Return b(q, t), shape (…, n), at states of shape (…, n) and one time (s), or a time for each."""
         return self._variational(states, time)[..., : np.shape(states)[-1]]
 
     def jacobian(self, states: Array, time: float | Array = 0.0) -> Array:
@@ -83,10 +68,7 @@ class VectorField:
     def hamiltonian_rate(self, states: Array, momenta: Array, time: float | Array = 0.0) -> Array:
         """Return (q′, p′) of Hamilton's equations, shape (…, 2n), at states and momenta of shape (…, n).
 
-        Raises
-        ------
-        SceneError
-            The scene has no noise, so there are no momenta.
+        Raises SceneError for a scene without noise, which has no momenta.
         """
         points = np.concatenate([states, momenta, np.zeros((*np.shape(states)[:-1], 1))], axis=-1)
         return self._rates(Flow.HAMILTONIAN, points, time)[..., :-1]

@@ -13,7 +13,7 @@ import sympy
 from vibrokit.errors import FormulaError, shown
 from vibrokit.parts.formula import LARGEST_EXPONENT, OPERATIONS, fold, read, refusal
 
-LARGEST_EXACT_DENOMINATOR = 64  # of an exponent written as a decimal, such as 1.5
+_LARGEST_DENOMINATOR = 64  # of a number that is exact as a decimal, such as 1.5
 LONGEST_EXACT_CONSTANT = 20  # nodes of a SymPy tree
 
 _SYMPY_NAMES = {"abs": "Abs", "min": "Min", "max": "Max"}
@@ -81,11 +81,18 @@ def _built(node: ast.expr, parts: list[Any], symbols: Mapping[str, Any]) -> Any:
 def _power(base: Any, exponent: Any) -> Any:
     """Return a power; exponents such as 1.5 become exact, so that half-integer powers stay roots."""
     _check_exponent(exponent)
-    if exponent.is_Float:
-        exact = Fraction(float(exponent))
-        if exact.denominator <= LARGEST_EXACT_DENOMINATOR:
-            exponent = sympy.Rational(exact.numerator, exact.denominator)
-    return base**exponent
+    found = exact(float(exponent)) if exponent.is_Float else exponent
+    return base ** (found if found.is_Rational else exponent)
+
+
+def exact(value: Any) -> Any:
+    """Return a float such as 1.5, with a denominator of at most 64, as an exact fraction."""
+    if isinstance(value, float):
+        fraction = Fraction(value)
+        if fraction.denominator <= _LARGEST_DENOMINATOR:
+            return sympy.Rational(fraction.numerator, fraction.denominator)
+        return sympy.Float(value, 17)
+    return value
 
 
 def _stable(expression: sympy.Expr) -> sympy.Expr:

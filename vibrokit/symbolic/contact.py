@@ -9,7 +9,8 @@ import sympy
 
 from vibrokit.errors import DerivationError
 from vibrokit.parts.barrier import Barrier
-from vibrokit.symbolic.formulas import derived_formula, exact
+from vibrokit.parts.formula_expression import exact
+from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.jumps import refuse_jumps
 
 DEPTH = sympy.Symbol("depth", positive=True)

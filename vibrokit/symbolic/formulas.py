@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
 from typing import Any
 
 import sympy
 from sympy.concrete.expr_with_limits import ExprWithLimits
 
 from vibrokit.errors import DerivationError
+from vibrokit.parts.formula_expression import exact
 from vibrokit.parts.part import Part
 from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.printer import FUNCTIONS
 from vibrokit.symbolic.symbols import parameter_symbols
 
-_LARGEST_DENOMINATOR = 64
 _CALLS = (sympy.Function, ExprWithLimits, sympy.Derivative, sympy.Subs)
 
 
@@ -97,13 +96,3 @@ def formulas_of(scene: Scene, path: str, part: Part) -> str:
         return str(sympy.srepr(found))
     except Exception:
         return ""
-
-
-def exact(value: Any) -> Any:
-    """Return a float such as 1.5, with a denominator of at most 64, as an exact fraction."""
-    if isinstance(value, float):
-        fraction = Fraction(value)
-        if fraction.denominator <= _LARGEST_DENOMINATOR:
-            return sympy.Rational(fraction.numerator, fraction.denominator)
-        return sympy.Float(value, 17)
-    return value

@@ -25,9 +25,9 @@ _NOT_LOCATED = "and no stepper locates that, so multipliers and energies would b
 def refuse_jumps(
     part: Any,
     force: sympy.Expr,
-    state: Sequence[sympy.Symbol],
-    values: Mapping[str, sympy.Expr],
-    natural_frequency: float,
+    state: Sequence[sympy.Symbol],  # displacement and velocity, or depth and rate, then extra states
+    values: Mapping[str, sympy.Expr],  # the symbol of each parameter of the part
+    natural_frequency: float,  # (s⁻¹), for the width of the smooth form that the error suggests
 ) -> None:
     """Raise DerivationError if a force, or a rate or an amplitude of the noise, jumps in a variable of the state.
 
@@ -37,19 +37,6 @@ def refuse_jumps(
     A force can jump only where the argument of one of its switches vanishes: of a sign, a step, a condition, or a
     divisor. Its one-sided limits are compared there, at sixty digits, for the scene's own parameters and for random
     ones, so that f*sign(v) is refused at f = 0 too: the same compiled code serves other values of f.
-
-    Parameters
-    ----------
-    part : Part
-        The part whose force it is.
-    force : sympy.Expr
-        Its formula.
-    state : sequence of sympy.Symbol
-        Displacement and velocity, or depth and rate, then extra states: the symbols in which it must not jump.
-    values : mapping
-        The symbol of each parameter of the part.
-    natural_frequency : float
-        ω_n (s⁻¹), for the width of the smooth form that the error suggests.
     """
     for variable in sorted(state, key=lambda symbol: symbol.name not in _SPEEDS):  # friction is named first
         _refuse(part, force, variable, values, natural_frequency)
