@@ -1,7 +1,6 @@
 """The covariance that noise gathers along a motion: SciPy's DOP853 on its equations, and exponentials of matrices."""
 
 import math
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.scenes import Coupled
 from vibrokit.errors import SceneError, StepperError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
 from vibrokit.kernels.ensemble import run_ensemble
@@ -135,26 +135,9 @@ def test_short_times_between_the_stops(paper, stepper, duration):
     np.testing.assert_allclose(found, true, rtol=1e-8)
 
 
-class Coloured(vk.NoiseModel):
-    """Noise through a low pass, faster than the oscillator."""
-
-    extra_states: ClassVar = ("y",)
-
-    rate: float = vk.parameter("a", "s^-1", above=0)
-
-    def amplitude(self, x, v):
-        return 2
-
-    def force(self, y):
-        return y
-
-    def drift(self, x, v, y):
-        return (-self.rate * y + v / 5,)
-
-
 @pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-12), vk.RK4(16384)], ids=lambda s: s.name)
 def test_states_of_the_noise_have_a_covariance_too(stepper):
-    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.3, noise=Coloured(intensity=1e-3, rate=9.0))
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.3, noise=Coupled(intensity=1e-3, rate=9.0))
     matrix = np.array([[0.0, 1.0, 0.0], [-1.0, -0.6, 1.0], [0.0, 0.2, -9.0]])
     moved, true = gathered_in(matrix, np.diag([0.0, 0.0, 4.0]), osc.section_interval)
     start = np.array([0.3, -0.2, 0.5])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import impacting
 from vibrokit.kernels import ensemble
 from vibrokit.kernels.ensemble import Stop, run_ensemble
 from vibrokit.kernels.stopping import COMPLETED, LEFT_BASIN, LEFT_REGION, REACHED
@@ -20,15 +21,6 @@ STEPPERS = [RK, vk.FreeFlight()]
 PARTS = 16  # of the period
 COUNT = 150  # more than any number of lanes, and no multiple of one
 EVERYWHERE = [-np.inf, np.inf]
-
-
-@functools.cache
-def impacting():
-    return vk.Oscillator(
-        natural_frequency=1.0, damping_ratio=0.01, noise=vk.WhiteNoise(1e-3),
-        excitations=[vk.Harmonic(0.18, 0.57), vk.Constant(0.2)],
-        barriers=[vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.5, "left")],
-    )  # fmt: skip
 
 
 def scattered(count=COUNT, reach=0.7):

@@ -1,6 +1,5 @@
 """Ensembles: the same bits however the work is split; numbers out of range are reported, with time and state."""
 
-import functools
 import math
 import warnings
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.scenes import impacting, scene
 from vibrokit.errors import IntegrationError
 from vibrokit.kernels import ensemble
 from vibrokit.kernels.ensemble import run_ensemble
@@ -18,39 +18,36 @@ from vibrokit.kernels.streams import streams_of
 from vibrokit.symbolic.flow_kind import Flow
 
 
-def scene(**more):
-    stops = [vk.Barrier(vk.Hertz(50.0), 0.5, "right")]
-    return vk.Oscillator(**{"natural_frequency": 1.0, "damping_ratio": 0.01, "barriers": stops} | more)
+def stopped(**more):
+    return scene(vk.Barrier(vk.Hertz(50.0), 0.5, "right"), **more)
 
 
 # --- the same bits, wherever and however the work is split
 
-FLOWS = [Flow.STATE, Flow.HAMILTONIAN, Flow.NOISY]
+CASES = {
+    "rk4 state": (vk.RK4(64), Flow.STATE), "rk4 hamiltonian": (vk.RK4(64), Flow.HAMILTONIAN),
+    "rk4 noisy": (vk.RK4(64), Flow.NOISY), "order8": (vk.Order8(1e-10), Flow.STATE),
+    "free flight": (vk.FreeFlight(1e-10), Flow.STATE),
+}  # fmt: skip
 COUNT = 333  # no multiple of any block or lane count
 
 
-@functools.cache
-def impacting():
-    return scene(
-        excitations=(vk.Harmonic(0.18, 0.57), vk.Constant(0.2)), noise=vk.WhiteNoise(1e-3), barriers=[
-            vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.5, "left"),
-        ],
-    )  # fmt: skip
-
-
-def work(flow, executor=None, first=0, count=COUNT):
+def work(case, executor=None, first=0, count=COUNT):
     """Every trajectory's end, with budgets of their own so that lanes are refilled."""
+    stepper, flow = CASES[case]
     rng = np.random.default_rng(5)
     starts = rng.uniform(-0.7, 0.7, (COUNT, 2))
     if flow is Flow.HAMILTONIAN:
         starts = np.hstack([starts, rng.uniform(-1e-3, 1e-3, (COUNT, 2)), np.zeros((COUNT, 1))])
     chosen = slice(first, first + count)
     ended = run_ensemble(
-        impacting(), flow, vk.RK4(steps=64), starts[chosen], (np.arange(COUNT) % 5)[chosen],
+        impacting(), flow, stepper, starts[chosen], (np.arange(COUNT) % 5)[chosen],
         streams=streams_of(11, np.arange(COUNT)[chosen]) if flow is Flow.NOISY else None, executor=executor,
     )  # fmt: skip
     assert ended.intervals.tolist() == (np.arange(COUNT) % 5)[chosen].tolist()
-    return ended.states
+    assert np.isfinite(ended.states).all()
+    assert len(np.unique(ended.states[:, 0])) == count
+    return ended.states.tobytes()
 
 
 class Serial(Executor):
@@ -62,9 +59,10 @@ class Serial(Executor):
         return future
 
 
-@pytest.fixture(scope="module")
-def reference():
-    return {flow: work(flow, Serial()) for flow in FLOWS}
+@pytest.fixture(scope="module", params=CASES)
+def case(request):
+    """A stepper and a flow, and the bits of the ensemble when nothing is split."""
+    return request.param, work(request.param, Serial())
 
 
 @pytest.fixture(scope="module")
@@ -73,29 +71,21 @@ def processes():
         yield pool
 
 
-@pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.value)
-class TestSameBits:
-    def test_threads(self, reference, flow):
-        assert work(flow).tobytes() == reference[flow].tobytes()
-        with ThreadPoolExecutor(3) as pool:
-            assert work(flow, pool).tobytes() == reference[flow].tobytes()
+def test_bits_in_threads_and_processes(case, processes):
+    name, bits = case
+    assert work(name) == bits
+    with ThreadPoolExecutor(3) as pool:
+        assert work(name, pool) == bits
+    assert work(name, processes) == bits
 
-    def test_processes(self, reference, processes, flow):
-        assert work(flow, processes).tobytes() == reference[flow].tobytes()
 
-    @pytest.mark.parametrize(("block", "smallest"), [(64, 64), (7, 7), (1, 1), (4096, 4096)])
-    def test_block_sizes(self, reference, flow, monkeypatch, block, smallest):
-        monkeypatch.setattr(ensemble, "_BLOCK", block)
-        monkeypatch.setattr(ensemble, "_SMALLEST_BLOCK", smallest)
-        assert work(flow, Serial()).tobytes() == reference[flow].tobytes()
-
-    def test_parts_of_the_ensemble(self, reference, flow):
-        parts = [work(flow, first=first, count=111) for first in (0, 111, 222)]
-        assert np.concatenate(parts).tobytes() == reference[flow].tobytes()
-
-    def test_the_ends_are_finite_and_differ(self, reference, flow):
-        assert np.isfinite(reference[flow]).all()
-        assert len(np.unique(reference[flow][:, 0])) == COUNT
+def test_bits_in_blocks_and_parts(case, monkeypatch):
+    name, bits = case
+    for size in (64, 7, 1, 4096):
+        monkeypatch.setattr(ensemble, "_BLOCK", size)
+        monkeypatch.setattr(ensemble, "_SMALLEST_BLOCK", size)
+        assert work(name, Serial()) == bits
+    assert b"".join(work(name, first=first, count=111) for first in (0, 111, 222)) == bits
 
 
 def test_noise_depends_on_seed_and_index():
@@ -112,7 +102,7 @@ RUNAWAY = {"spring": vk.CubicSpring(1.0, -1.0), "barriers": ()}
 
 
 def test_a_runaway_is_reported_with_time_and_state():
-    osc = scene(**RUNAWAY)
+    osc = stopped(**RUNAWAY)
     with pytest.raises(IntegrationError) as error:
         osc.trajectory((2.0, 1.0), periods=3, stepper=vk.RK4())
     assert 0.0 < error.value.time < 2.0
@@ -121,7 +111,7 @@ def test_a_runaway_is_reported_with_time_and_state():
 
 
 def test_a_runaway_leaves_the_others_alone():
-    osc = scene(**RUNAWAY)
+    osc = stopped(**RUNAWAY)
     starts = np.random.default_rng(3).uniform(-0.3, 0.3, (100, 2))
     alone = run_ensemble(osc, Flow.STATE, vk.RK4(), starts, 5)
     starts[17] = 2.0, 1.0
@@ -136,7 +126,7 @@ def test_a_runaway_leaves_the_others_alone():
 
 @pytest.mark.parametrize("flow", [Flow.NOISY, Flow.HAMILTONIAN], ids=lambda flow: flow.value)
 def test_runaways_of_other_flows(flow):
-    osc = scene(**RUNAWAY, noise=vk.WhiteNoise(1e-3))
+    osc = stopped(**RUNAWAY, noise=vk.WhiteNoise(1e-3))
     starts = np.array([[2.0, 1.0, 0.0, 0.0, 0.0]])[:, : 5 if flow is Flow.HAMILTONIAN else 2]
     ended = run_ensemble(
         osc, flow, vk.RK4(), starts, 3, streams=streams_of(1, np.arange(1)) if flow is Flow.NOISY else None
@@ -149,19 +139,16 @@ def test_no_warning_is_let_out_of_a_runaway():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(IntegrationError):
-            scene(**RUNAWAY).section_map([[2.0, 1.0]], periods=2, stepper=vk.RK4())
+            stopped(**RUNAWAY).section_map([[2.0, 1.0]], periods=2, stepper=vk.RK4())
 
 
-def test_an_empty_ensemble():
-    assert scene().section_map(np.empty((0, 2)), stepper=vk.RK4()).shape == (0, 2)
-
-
-def test_no_periods_at_all():
-    assert scene().section_map([[0.1, 0.2]], periods=0, stepper=vk.RK4()).tolist() == [[0.1, 0.2]]
+def test_nothing_to_do():
+    assert stopped().section_map(np.empty((0, 2)), stepper=vk.RK4()).shape == (0, 2)
+    assert stopped().section_map([[0.1, 0.2]], periods=0, stepper=vk.RK4()).tolist() == [[0.1, 0.2]]
 
 
 def test_read_only_and_strided_arrays_compile_nothing_new():
-    osc, stepper = scene(), vk.RK4(steps=64)
+    osc, stepper = stopped(), vk.RK4(steps=64)
     starts = np.random.default_rng(0).uniform(-0.4, 0.4, (10, 2))
     plain = run_ensemble(osc, Flow.STATE, stepper, starts, 2)
     compiled = kernel_for(osc, Flow.STATE, stepper).driver.module.advance.signatures

@@ -2,7 +2,6 @@
 
 import ast
 import difflib
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from vibrokit_hunt_crossley import HuntCrossley
 
 import vibrokit as vk
 from tests.layers import slow
+from tests.scenes import Coupled
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.structure.manifolds import FlowMap
@@ -86,26 +86,9 @@ def test_a_law_that_would_pull_is_cut_where_it_is_cut_forwards():
     assert np.abs(preimages(osc, starts, stepper=vk.Order8(1e-11)) - expected).max() < 1e-8
 
 
-class Coloured(vk.NoiseModel):
-    """Noise through a low pass."""
-
-    extra_states: ClassVar = ("y",)
-
-    rate: float = vk.parameter("a", "s^-1", above=0)
-
-    def amplitude(self, x, v):
-        return 1
-
-    def force(self, y):
-        return y
-
-    def drift(self, x, v, y):
-        return (-self.rate * y + v / 5,)
-
-
 @pytest.mark.slow
 def test_states_of_the_noise_run_backwards_too():
-    osc = scene(excitations=(), noise=Coloured(intensity=1e-3, rate=0.4))
+    osc = scene(excitations=(), noise=Coupled(intensity=1e-3, rate=0.4))
     matrix = expm(-osc.section_interval * np.array([[0.0, 1.0, 0.0], [-1.0, -0.04, 1.0], [0.0, 0.2, -0.4]]))
     starts = np.random.default_rng(3).uniform(-1.0, 1.0, (20, 3))
     for stepper in EXACT:

@@ -1,16 +1,11 @@
-"""A trajectory has the same bits serially, on threads and in processes, whoever compiled its kernel."""
+"""A trajectory has the same bits whoever compiled its kernel."""
 
-import concurrent.futures
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
 
-import numpy as np
 import pytest
-
-import vibrokit as vk
 
 pytestmark = pytest.mark.slow
 
@@ -68,21 +63,3 @@ def test_compiled_and_loaded_kernels_give_the_same_bits(tmp_path):
     )
     assert len(compiled) == 6
     assert compiled == loaded
-
-
-@pytest.mark.parametrize("stepper", [vk.FreeFlight(tolerance=1e-10), vk.Order8(tolerance=1e-10)], ids=lambda s: s.name)
-def test_threads_and_processes_give_the_same_bits(stepper):
-    # A kernel that no other test has, so that this process compiles what the others load.
-    osc = vk.Oscillator(
-        natural_frequency=1.0,
-        damping_ratio=0.01,
-        barriers=(vk.Barrier(vk.Hertz(50.0), 0.5, "right"), vk.Barrier(vk.Hertz(50.0), -0.5, "left")),
-        excitations=(vk.Harmonic(0.18, 0.57), vk.Harmonic(0.02, 1.14), vk.Constant(0.2)),
-    )
-    states = np.random.default_rng(0).uniform(-0.6, 0.6, (200, 2))
-    context = multiprocessing.get_context("spawn")
-    alone = np.concatenate([osc.section_map(states[k : k + 10], 3, stepper=stepper) for k in range(0, 200, 10)])
-    with concurrent.futures.ThreadPoolExecutor(3) as threads:
-        np.testing.assert_array_equal(osc.section_map(states, 3, stepper=stepper, executor=threads), alone)
-    with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as processes:
-        np.testing.assert_array_equal(osc.section_map(states, 3, stepper=stepper, executor=processes), alone)

@@ -48,106 +48,52 @@ def run(code, given=""):
     return done.stdout
 
 
+STRANGE = {  # a character that no formula has, and texts in which it is the first such one
+    "[": ("depth[0]", "[depth]", "[i for i in depth]"), "{": ("{depth}",), ":": ("lambda: 1", "(depth := 1)"),
+    "=": ("depth = 1", "depth == 1", "sin(depth=1)"), "<": ("depth < 1", "1 < depth > 2"), "!": ("depth != 1",),
+    "'": ("'depth'", "f'{depth}'", "k'x'", "__import__('os').system('true')"), '"': ('"depth"',), "%": ("depth % 2",),
+    "@": ("depth @ rate",), "&": ("depth & rate",), "~": ("~depth",), ";": ("depth; rate",), "#": ("depth # + 1",),
+    "\\": ("depth \\",), "`": ("`depth`",), "\u03b4": ("\u03b4*2",), "\u0434": ("k * \u0434epth",),
+    "\uff44": ("\uff44epth",), "\n": ("depth\n+ 1",), "\t": ("depth\t",), "\x00": ("depth\x00",),
+    "\ud800": ("depth + \ud800",),
+}  # fmt: skip
 REFUSED = [  # text, column, and the offending value or the limit in the message
+    *((text, text.index(sign) + 1, f"{sign!a}") for sign, texts in STRANGE.items() for text in texts),
+    *((text, 1, f"'{text}'") for text in (  # no part of the arithmetic that formulas have
+        "depth.real", "1 .real", "1..real", "1j", "True", "None", "not depth", "depth and rate", "depth if rate else k",
+        "await depth", "min(**depth)", "...", "nan", "inf", "1e999", "9" * 16, "0x10", "1_000", "1if depth else 2",
+        "2(depth)", "sin", "_k", "__name__", "depth.__class__.__bases__", "depth, rate", "(depth, rate)", "depth // 2",
+        "acos(2)", "0**-1", "(-8)**(1/3)",
+    )),
+    *((text, None, f"'{text}'") for text in (".depth", "yield", "1e", "1.2.3", "007", "2depth", "depth +")),
     ("depth^2", 6, "write ** for a power"),
-    ("depth.real", 1, "'depth.real'"),
-    (".depth", None, "'.depth'"),
-    ("1 .real", 1, "'1 .real'"),
-    ("1..real", 1, "'1..real'"),
     ("().__class__", 1, "'()'"),
-    ("depth[0]", 6, "'['"),
-    ("[depth]", 1, "'['"),
-    ("{depth}", 1, "'{'"),
-    ("[i for i in depth]", 1, "'['"),
     ("(i for i in depth)", 2, "'i'"),
-    ("lambda: 1", 7, "':'"),
     ("lambda x: x", 9, "':'"),
-    ("(depth := 1)", 8, "':'"),
-    ("depth = 1", 7, "'='"),
-    ("depth == 1", 7, "'='"),
-    ("depth < 1", 7, "'<'"),
-    ("1 < depth > 2", 3, "'<'"),
-    ("depth != 1", 7, "'!'"),
-    ("'depth'", 1, '"\'"'),
-    ('"depth"', 1, "'\"'"),
-    ("f'{depth}'", 2, '"\'"'),
-    ("k'x'", 2, '"\'"'),
-    ("1j", 1, "'1j'"),
     ("depth + 2.5J", 9, "'2.5J'"),
-    ("True", 1, "'True'"),
-    ("None", 1, "'None'"),
-    ("not depth", 1, "'not depth'"),
-    ("depth and rate", 1, "'depth and rate'"),
-    ("depth if rate else k", 1, "'depth if rate else k'"),
-    ("await depth", 1, "'await depth'"),
-    ("yield", None, "'yield'"),
-    ("sin(x=1)", 6, "'='"),
-    ("sin(depth=1)", 10, "'='"),
     ("min(*depth)", 5, "'*depth'"),
-    ("min(**depth)", 1, "'min(**depth)'"),
-    ("...", 1, "'...'"),
-    ("nan", 1, "'nan'"),
-    ("inf", 1, "'inf'"),
     ("depth*Infinity", 7, "'Infinity'"),
-    ("1e999", 1, "'1e999'"),
     ("depth + 1e-999", 9, "'1e-999'"),
-    ("9" * 16, 1, "'9999999999999999'"),
     ("depth**" + "9" * 1000, 8, "99999"),
-    ("0x10", 1, "'0x10'"),
-    ("1_000", 1, "'1_000'"),
-    ("1e", None, "'1e'"),
-    ("1.2.3", None, "'1.2.3'"),
-    ("1if depth else 2", 1, "'1if depth else 2'"),
-    ("007", None, "'007'"),
-    ("2depth", None, "'2depth'"),
-    ("2(depth)", 1, "'2(depth)'"),
     ("depth rate", 7, "'depth rate'"),
     ("(depth)(rate)", 1, "'depth'"),
     ("depth(2)", 1, "'depth'"),
-    ("pi(2)", 1, "'pi'"),
-    ("sin", 1, "'sin'"),
     ("sin*2", 1, "'sin'"),
     ("x", 1, "allowed: c, depth, k, pi, rate"),
     ("dept", 1, "the nearest is 'depth'"),
     ("k*raet", 3, "the nearest is 'rate'"),
-    ("_k", 1, "'_k'"),
-    ("__name__", 1, "'__name__'"),
-    ("depth.__class__.__bases__", 1, "'depth.__class__.__bases__'"),
-    ("__import__('os').system('true')", 12, '"\'"'),
     ("eval(depth)", 1, "allowed: abs, acos, asin,"),
-    ("ln(depth)", 1, "'ln'"),
-    ("sine(depth)", 1, "the nearest is 'sin'"),
     ("tanhh(depth)", 1, "the nearest is 'tanh'"),
     ("pow(depth, 2)", 1, "'pow'"),
     ("sin()", 1, "the number of arguments of sin is 0"),
     ("sin(depth, rate)", 1, "the number of arguments of sin is 2"),
-    ("min(depth)", 1, "the number of arguments of min is 1"),
     ("max(depth,)", 1, "the number of arguments of max is 1"),
     ("max(" + ",".join(["depth"] * 25) + ")", 1, "25 arguments in all; at most 24"),
-    ("depth, rate", 1, "'depth, rate'"),
-    ("(depth, rate)", 1, "'(depth, rate)'"),
     ("sin((depth, rate))", 5, "'(depth, rate)'"),
-    ("depth +", None, "'depth +'"),
     ("(depth", 1, "'(depth'"),
     ("k*sin(depth", 6, "'k*sin(depth'"),
     ("depth)", 6, "'depth)'"),
-    ("depth // 2", 1, "'depth // 2'"),
     ("depth *** 2", 9, "'depth *** 2'"),
-    ("depth % 2", 7, "'%'"),
-    ("depth @ rate", 7, "'@'"),
-    ("depth & rate", 7, "'&'"),
-    ("~depth", 1, "'~'"),
-    ("depth; rate", 6, "';'"),
-    ("depth # + 1", 7, "'#'"),
-    ("depth \\", 7, "'\\\\'"),
-    ("`depth`", 1, "'`'"),
-    ("\u03b4*2", 1, "'\\u03b4'"),
-    ("k * \u0434epth", 5, "'\\u0434'"),
-    ("\uff44epth", 1, "'\\uff44'"),
-    ("depth\n+ 1", 6, "'\\n'"),
-    ("depth\t", 6, "'\\t'"),
-    ("depth\x00", 6, "'\\x00'"),
-    ("depth + \ud800", 9, "'\\ud800'"),
     ("depth**65", 8, "an exponent is 65"),
     ("depth**-65", 8, "an exponent is -65"),
     ("depth**64.5", 8, "an exponent is 64.5"),
@@ -156,20 +102,15 @@ REFUSED = [  # text, column, and the offending value or the limit in the message
     ("depth**rate**2", 8, "contains a power"),
     ("depth**(1 + rate**2)", 9, "contains a power"),
     ("9**9**9**9**9", 10, "contains a power"),
-    ("10**10**10", 5, "contains a power"),
     ("((depth + 1)**8)**9", 19, "multiply to 72; at most 64"),
     ("(1 + (k + depth**8)**3)**3", 26, "multiply to 72; at most 64"),
     ("1/0", 3, "divides by zero"),
-    ("0**-1", 1, "'0**-1'"),
-    ("depth/0", 7, "divides by zero"),
     ("depth/(1 - 1.0)", 8, "divides by zero"),
     ("depth + sqrt(-1)", 9, "'sqrt(-1)'"),
-    ("(-8)**(1/3)", 1, "'(-8)**(1/3)'"),
     ("log(0)*depth", 1, "'log(0)'"),
-    ("acos(2)", 1, "'acos(2)'"),
     ("exp(exp(exp(9)))", 5, "'exp(exp(9))'"),
     ("1e300*1e300*depth", 1, "'1e300*1e300'"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "column", "value"), REFUSED, ids=[ascii(text)[:40] for text, *_ in REFUSED])
@@ -184,22 +125,18 @@ def test_refused(text, column, value):
 
 
 HUGE = {
-    "a megabyte of a name": "a" * 10**6,
-    "a megabyte of digits": "9" * 10**6,
+    **{
+        f"a megabyte of {short!a}": short * (10**6 // len(short))
+        for short in ("a", "9", "(", "[", " ", "\u03b4", "9**")
+    },
     "a megabyte of sums": "depth+" * 170_000 + "depth",
     "a megabyte of parentheses": "(" * 500_000 + "depth" + ")" * 500_000,
-    "a megabyte of open parentheses": "(" * 10**6,
-    "a megabyte of brackets": "[" * 10**6,
     "a megabyte of signs": "-" * 10**6 + "depth",
-    "a megabyte of powers": "9**" * 330_000 + "9",
-    "a megabyte of spaces": " " * 10**6,
-    "a megabyte of Greek": "\u03b4" * 10**6,
     "a megabyte of attributes": "depth" + ".real" * 200_000,
     "one character too many": "depth" + " " * 1996,
     "one parenthesis too deep": "(" * 51 + "depth" + ")" * 51,
     "one call too deep": "sin(" * 51 + "depth" + ")" * 51,
     "deep parentheses": "(" * 990 + "depth" + ")" * 990,
-    "deep braces": "{" * 1000 + "}" * 1000,
     "deep open parentheses": "(" * 2000,
     "many signs": "-" * 1990 + "depth",
     "one node too many": "-" * 500 + "k",
@@ -239,13 +176,11 @@ def test_what_is_no_text_is_refused(value):
 
 @pytest.mark.parametrize("text", ["", " ", "     "])
 def test_empty_text_is_refused(text):
-    with pytest.raises(FormulaError, match=r"^The formula is empty"):
+    with pytest.raises(FormulaError, match=r"^The formula is empty") as caught:
         parse(text)
-
-
-def test_error_is_one_of_the_toolkit_and_a_value_error():
-    assert issubclass(FormulaError, VibrokitError)
-    assert issubclass(FormulaError, ValueError)
+    assert isinstance(caught.value, VibrokitError)
+    assert isinstance(caught.value, ValueError)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -289,30 +224,10 @@ def test_random_text_gives_a_tree_or_a_formula_error():
     assert min(outcomes.values()) > 100
 
 
-NOT_ARITHMETIC = [
-    "depth.real",
-    "depth[0]",
-    "lambda: 1",
-    "'a'",
-    "b'a'",
-    "1j",
-    "True < 2",
-    "[1]",
-    "f'{k}'",
-    "k if k else k",
-]
-NOT_ARITHMETIC += [
-    "(k := 1)",
-    "sin(x=k)",
-    "sin(**k)",
-    "sin(*k)",
-    "k.sin(k)",
-    "[k for k in k]",
-    "~k",
-    "k @ k",
-    "k and k",
-    "...",
-]
+NOT_ARITHMETIC = (
+    "depth.real", "depth[0]", "lambda: 1", "'a'", "b'a'", "1j", "True < 2", "[1]", "f'{k}'", "k if k else k",
+    "(k := 1)", "sin(x=k)", "sin(**k)", "sin(*k)", "k.sin(k)", "[k for k in k]", "~k", "k @ k", "k and k", "...",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("text", NOT_ARITHMETIC)
@@ -553,8 +468,3 @@ def test_import_and_checks_need_no_sympy():
         "assert not {'sympy', 'numpy', 'numba'} & set(sys.modules)\n"
     )
     run(code)
-
-
-def test_formula_error_travels_between_processes():
-    error = pickle.loads(pickle.dumps(FormulaError("The formula is wrong.")))
-    assert str(error) == "The formula is wrong."
