@@ -221,31 +221,77 @@ class StraightLine(Source):
                 yield Candidate(problem.source, target, times, states, 1.0, self.name)
 
 
-class Failing(StraightLine):
-    """A source that raises, after others."""
+class Other(StraightLine):
+    """A source with a fault, after good candidates."""
+
+    name = "others"
+
+    def __init__(self, fault):
+        self.fault = fault
 
     def propose(self, problem, polished):
-        raise StructureError("it cannot.")
+        for good in super().propose(problem, polished):
+            yield good
+            yield self.fault(good)
 
 
-class Silent(StraightLine):
-    """A source that has nothing to say."""
+def raised(error):
+    raise error
 
-    def propose(self, problem, polished):
-        return ()
+
+def replaced(**values):
+    return lambda good: dataclasses.replace(good, **values)
+
+
+FAULTS = {
+    "it cannot.": lambda good: raised(StructureError("it cannot.")),
+    "ValueError: no": lambda good: raised(ValueError("no")),
+    "Candidate objects, got 'a path'": lambda good: "a path",
+    "leaves 1": replaced(source=1),
+    "leads to 7": replaced(target=7),
+    "action nan": replaced(action=math.nan),
+    "5 times": lambda good: dataclasses.replace(good, times=good.times[:5]),
+    "positive and equal": lambda good: dataclasses.replace(good, times=good.times**2),
+}
 
 
 def test_a_source_of_a_user_proposes_and_is_polished(structure):
     problem = ExitProblem(OSC, structure, structure.attractors[0], vk.LeaveBasin())
-    found = ExitRoad(problem, [Silent(), StraightLine(), Failing()]).run()
+    found = ExitRoad(problem, [StraightLine()]).run()
     (energy,) = found.estimates
     assert energy.value == pytest.approx(EXACT, rel=1e-6)
     assert energy.certificate is not None
     assert (energy.bound, energy.lower) == (Bound.UPPER, 0.0)  # nothing has excluded a cheaper path
+
+
+@pytest.mark.parametrize("says", FAULTS)
+def test_a_fault_of_a_source_is_a_finding_and_what_it_proposed_before_is_used(structure, says):
+    problem = ExitProblem(OSC, structure, structure.attractors[0], vk.LeaveBasin())
+    found = ExitRoad(problem, [Other(FAULTS[says])]).run()
+    assert found.estimates[0].value == pytest.approx(EXACT, rel=1e-6)
     (failed,) = (finding for finding in found.findings if finding.code is Code.METHOD_FAILED)
-    assert failed.values == {"method": "straight lines", "reason": "it cannot."}
-    with pytest.raises(StructureError, match="it cannot"):
-        ExitRoad(problem, [Failing()]).run()
+    assert failed.values["method"] == "others"
+    assert says in failed.values["reason"]
+
+
+class Nothing(StraightLine):
+    """A source that proposes nothing, or not even that."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def propose(self, problem, polished):
+        return self.answer
+
+
+def test_a_source_that_proposes_nothing_is_a_finding_and_one_that_fails_alone_an_error(structure):
+    problem = ExitProblem(OSC, structure, structure.attractors[0], vk.LeaveBasin())
+    found = ExitRoad(problem, [Nothing(()), Nothing(None), StraightLine()]).run()
+    assert found.estimates[0].value == pytest.approx(EXACT, rel=1e-6)
+    codes = [finding.code for finding in found.findings]
+    assert codes[:2] == [Code.NOTHING_PROPOSED, Code.METHOD_FAILED]
+    with pytest.raises(StructureError, match="TypeError"):
+        ExitRoad(problem, [Nothing(None)]).run()
 
 
 class LeaveLeft(LeaveRegion):

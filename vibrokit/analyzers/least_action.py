@@ -15,7 +15,7 @@ from vibrokit.analyzers.polishing.certified import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.road import ExitRoad
 from vibrokit.analyzers.shooting.shooting import Shooting
-from vibrokit.analyzers.sources import ClosestApproach, Graph, MirrorImages, Relaxations, Shots
+from vibrokit.analyzers.sources import ClosestApproach, Graph, MirrorImages, Relaxations, Shots, Source
 from vibrokit.arguments import whole
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.energy import Bound
@@ -106,12 +106,15 @@ class LeastAction(Analyzer):
 
     def road(self, problem: ExitProblem) -> ExitRoad:
         """Return the road that it takes, before anything is done."""
+        return ExitRoad(problem, self.sources(problem), accuracy=self.accuracy, orbits=self.orbits)
+
+    def sources(self, problem: ExitProblem) -> list[Source]:
+        """Return the sources of its road, in their order; a subclass may put more among them."""
         shoots = self.shooting is not None and problem.attractor.is_fixed
         graph = None if self.graph is None else Graph(self.graph, shots_follow=shoots)
         shots = None if self.shooting is None else Shots(self.shooting)
         sources = (Relaxations(), graph, shots, MirrorImages(), ClosestApproach(graph))
-        proposing = [source for source in sources if source is not None]
-        return ExitRoad(problem, proposing, accuracy=self.accuracy, orbits=self.orbits)
+        return [source for source in sources if source is not None]
 
     def _analyzing(self) -> Callable[[ExitProblem], Analysis]:
         """Return what analyzes attractors in turn; it searches only one of two that are mirror images."""

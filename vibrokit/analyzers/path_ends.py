@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC
 
+from vibrokit.errors import StructureError, shown
+
 
 @dataclasses.dataclass(frozen=True)
 class PathEnd(ABC):
@@ -70,7 +72,17 @@ class AtSaddle(PathEnd):
 
 @dataclasses.dataclass(frozen=True)
 class InBasin(PathEnd):
-    """Any state of the target's basin, for a target that no known saddle leads to."""
+    """Any state of the target's basin, for a target that no known saddle leads to.
+
+    Raises StructureError if a target is no attractor: what is no basin has no such end.
+    """
+
+    def __post_init__(self) -> None:
+        if min(self.targets) < 0:
+            raise StructureError(
+                f"InBasin: targets must be labels of attractors, 0 or more, got {shown(self.targets)}; an exit that is "
+                "no basin ends at saddles or on faces."
+            )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -21,8 +21,8 @@ from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.polish import Polishing, Shared
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.search import Search
-from vibrokit.analyzers.sources import Graph, Shots, Source
-from vibrokit.errors import SceneError, StepperError, StructureError, VibrokitError
+from vibrokit.analyzers.sources import Graph, Shots, Source, check_proposal
+from vibrokit.errors import OutOfTime, StepperError, StructureError, VibrokitError
 from vibrokit.progress import stage
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import ActivationEnergy, Bound
@@ -107,6 +107,8 @@ class ExitRoad:
         """Polish what a source proposes."""
         found = self._asked(source, functools.partial(source.propose, self.problem, self._polished[0]))
         self._findings += source.findings
+        if not found and source.expected:
+            self._findings.append(Finding.of(Code.NOTHING_PROPOSED, self.problem.source, method=source.name))
         if source.attains:
             self._least = detailed_balance.with_paths(self.problem, self._least, found)
         waiting = self._polishings is not None and source.effort > Effort.SHOOT  # candidates of sources before
@@ -114,15 +116,21 @@ class ExitRoad:
             self._polish(found, source.effort)
 
     def _asked(self, source: Source, propose: Callable[[], Iterable[Candidate]]) -> Sequence[Candidate]:
-        """What a source proposes; its error is a finding, unless nothing else searches and nothing is known."""
+        """What a source proposes until an error, which is a finding; raised if nothing else searches or is known."""
+        found = list[Candidate]()
         try:
-            return tuple(propose())
-        except (SceneError, StructureError, StepperError) as error:
+            for candidate in propose():
+                check_proposal(candidate, self.problem)
+                found.append(candidate)
+        except OutOfTime:
+            raise
+        except Exception as error:  # a source may be anybody's
+            told = error if isinstance(error, VibrokitError) else StructureError(f"{type(error).__name__}: {error}")
             alone = source.searches and not any(other.searches for other in self.sources if other is not source)
-            if alone and self.solution is None:
-                raise
-            self._failed(source.name, error)
-            return ()
+            if alone and not found and self.solution is None:
+                raise told from error
+            self._failed(source.name, str(told))
+        return found
 
     def _polish(self, candidates: Sequence[Candidate], effort: Effort = Effort.FROM_ORBIT) -> None:
         if self._polishings is None:
@@ -140,7 +148,7 @@ class ExitRoad:
             try:
                 found.append(Polishing(self.problem, orbit, shared))
             except (StructureError, StepperError) as error:
-                self._failed("polishing", error)
+                self._failed("polishing", str(error))
         return found
 
     def _orbits_inside(self) -> tuple[Orbit, ...]:
@@ -229,12 +237,12 @@ class ExitRoad:
         try:
             energies, errors = shots.energies()
         except (StructureError, StepperError) as error:
-            self._failed("errors of the action plot", error)
+            self._failed("errors of the action plot", str(error))
             energies, errors = dataclasses.replace(shots, complete=False).energies()
         self._findings += errors.findings
         self._cut |= errors.stopped
         return tuple(energies.values())
 
-    def _failed(self, method: str, error: VibrokitError) -> None:
+    def _failed(self, method: str, reason: str) -> None:
         """Note that a method could not be used."""
-        self._findings.append(Finding.of(Code.METHOD_FAILED, self.problem.source, method=method, reason=str(error)))
+        self._findings.append(Finding.of(Code.METHOD_FAILED, self.problem.source, method=method, reason=reason))

@@ -6,6 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.search import GraphSearch
 from vibrokit.analyzers.graph.solution import ExitCosts, GraphSolution
@@ -19,7 +21,9 @@ from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.shooting.search import Search
 from vibrokit.analyzers.shooting.shooting import Shooting
+from vibrokit.errors import StructureError, shown
 from vibrokit.progress import TRAJECTORIES, stage
+from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy, Bound
 from vibrokit.results.finding import Finding
 from vibrokit.symbolic.flow_kind import Flow
@@ -31,9 +35,11 @@ class Source(ABC):
     Attributes
     ----------
     name : str
-        Of the work, in findings.
+        Of the work, in findings: "the straight lines could not be used …".
     searches : bool
         Whether it looks everywhere. The error of the only source that does is an error of the road.
+    expected : bool
+        Whether it is a finding that it proposes nothing.
     attains : bool
         Whether its paths attain the proven minimum where detailed balance holds.
     effort : Effort
@@ -44,19 +50,56 @@ class Source(ABC):
 
     name: ClassVar[str]
     searches: ClassVar[bool] = False
+    expected: ClassVar[bool] = True
     attains: ClassVar[bool] = False
     effort: Effort = Effort.SHOOT
     findings: tuple[Finding, ...] = ()
 
     @abstractmethod
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Iterable[Candidate]:
-        """Return guesses of exit paths; `polished` are the paths that are known, the cheapest first."""
+        """Return guesses of exit paths; `polished` are the paths that are known, the cheapest first.
+
+        What it raises is a finding, and what it proposed before is used.
+        """
+
+
+def check_proposal(candidate: Candidate, problem: ExitProblem) -> None:
+    """Refuse what is no guess of an exit path of this attractor.
+
+    Raises
+    ------
+    StructureError
+    """
+    if not isinstance(candidate, Candidate):
+        raise StructureError(f"a source must propose Candidate objects, got {shown(candidate)}.")
+    count, size, labels = len(candidate.times), problem.attractor.points.shape[1], len(problem.structure.attractors)
+    momenta = candidate.states if candidate.momenta is None else candidate.momenta
+    if candidate.source != problem.source:
+        raise StructureError(f"a candidate leaves {shown(candidate.source)}; it must leave {problem.source}.")
+    if candidate.target not in range(ESCAPED, labels):
+        raise StructureError(
+            f"a candidate leads to {shown(candidate.target)}; it must lead to an attractor, 0 to {labels - 1}, or to "
+            f"another exit, -1, or to escape, {ESCAPED}."
+        )
+    if count < 2 or candidate.states.shape != (count, size) or momenta.shape != (count, size):
+        raise StructureError(
+            f"a candidate has {count} times, states of shape {candidate.states.shape} and momenta of shape "
+            f"{momenta.shape}; all must be of at least two times, of {size} numbers each."
+        )
+    steps = np.diff(candidate.times)
+    if not np.all(steps > 0) or not np.allclose(steps, steps[0], rtol=1e-3):
+        raise StructureError(
+            f"a candidate has steps of {shown(steps.min())} to {shown(steps.max())} s; they must be positive and equal."
+        )
+    if not candidate.action >= 0:
+        raise StructureError(f"a candidate has the action {shown(candidate.action)}; it must be 0 or positive.")
 
 
 class MirrorImages(Source):
     """The mirror images of paths, in a scene whose forces are odd: by default those of the attractor's own."""
 
     name = MIRROR
+    expected = False
 
     def __init__(self, known: Sequence[ActivationEnergy] | None = None) -> None:
         self._known = known
@@ -75,6 +118,7 @@ class Relaxations(Source):
     """Relaxations run backwards, to an equilibrium or under slow forcing."""
 
     name = reversed_relaxation.FINDER
+    expected = False
     attains = True
 
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Sequence[Candidate]:
@@ -101,6 +145,7 @@ class Graph(Source):
     """
 
     name = "graph"
+    expected = False
     searches = True
 
     def __init__(self, settings: GraphSearch, *, shots_follow: bool) -> None:
@@ -144,6 +189,7 @@ class Shots(Source):
     """
 
     name = "action plot"
+    expected = False
     searches = True
     effort = Effort.FROM_ORBIT
 
@@ -165,6 +211,7 @@ class ClosestApproach(Source):
     """Where a chaotic attractor comes nearest to a saddle, for exits that the graph gives no path to."""
 
     name = closest_approach.FINDER
+    expected = False
     effort = Effort.FROM_ORBIT
 
     def __init__(self, graph: Graph | None) -> None:

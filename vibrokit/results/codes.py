@@ -244,6 +244,8 @@ class Code(StrEnum):
     )  # fmt: skip
     METHOD_FAILED = "method-failed", WARNING, "The {method} could not be used for {state}: {reason}", _SEE_REASON
 
+    NOTHING_PROPOSED = "nothing-proposed", INFO, "The {method} proposed no exit path from {state}."
+
     # Action plot
     SHOTS = (
         "shots", INFO,

@@ -72,7 +72,7 @@ class PathSolver:
         guess = min(fitted, key=lambda each: each.action)
         action = guess.action
         for _, known in self._known:
-            if isinstance(known, ExtremalPath) and known.flat and same_action(known.action, action, _FITTED):
+            if isinstance(known, ExtremalPath) and _in_family(known, guess.first, guess.points, action):
                 return known
         try:
             found = self._descended(guess)
@@ -80,7 +80,7 @@ class PathSolver:
             return self._once(found)
         except StructureError as failure:
             hopeless = isinstance(failure, NotConverged) and failure.misfit > TOLERANCES.hopeful
-            if effort < Effort.FROM_ORBIT or hopeless or not action < (1 - _FITTED) * least:
+            if effort < Effort.FROM_ORBIT or hopeless or not action < 0.999 * least:  # else not worth its cost
                 raise
             return self._from_orbit(guess, failure)
 
@@ -156,9 +156,34 @@ class PathSolver:
 
 def _are_one(one: ExtremalPath, other: ExtremalPath) -> bool:
     """Return whether two paths that were not completed are one, or of one family."""
-    of_family = one.flat and other.flat
+    if one.flat and other.flat:
+        return same_action(one.action, other.action) and _in_family(one, other.first, other.points, other.action)
     alike = one.source.node(one.first) == other.source.node(other.first) and len(one.points) == len(other.points)
-    return (of_family or alike) and same_action(one.action, other.action)
+    return alike and same_action(one.action, other.action)
+
+
+def _in_family(known: ExtremalPath, first: int, points: Array, action: float) -> bool:
+    """Return whether a path, exact or of the Gauss–Newton method, is of the family of a known one.
+
+    All members have one action, and their states on the section lie on one line. Other paths, to other places, may have
+    nearly the same action. Near is within 5 % of the extent; at most 512 states are compared.
+    """
+    if not known.flat or not same_action(known.action, action, _FITTED):
+        return False
+    grain, size = known.ending.propagator.grain, len(known.scale) // 2
+    line, own = (
+        nodes[-number % grain :: grain, :size] / known.scale[:size]
+        for nodes, number in ((known.points, known.first), (points, first))
+    )
+    if not len(own) or len(line) < 2:
+        return False
+    starts, ways = line[:-1], np.diff(line, axis=0)
+    lengths = np.maximum((ways**2).sum(axis=1), 1e-300)
+    for state in own[np.linspace(0, len(own) - 1, min(len(own), 512)).astype(np.int64)]:
+        along = np.clip(((state - starts) * ways).sum(axis=1) / lengths, 0, 1)
+        if np.linalg.norm(state - starts - along[:, None] * ways, axis=1).min() >= 0.05:
+            return False
+    return True
 
 
 def _begun(propagator: SegmentPropagator, source: LinearizedOrbit, cut: Cut) -> tuple[LinearizedOrbit, int, Array]:
