@@ -1,4 +1,4 @@
-"""Calls of public classes and functions: arguments that they do not take are refused with a sentence."""
+"""Constructed, called: public classes and functions refuse arguments that they do not take with a sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Long work of a command: files are checked before it, and it shows progress, has a time limit and can be stopped."""
+"""Helpers of commands with long work: files are checked first, progress is shown, a limit or Ctrl-C stops it."""
 
 from __future__ import annotations
 

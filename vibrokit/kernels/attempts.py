@@ -1,4 +1,4 @@
-"""Writes what attempts of located steppers need of a scene: its slopes, and the layout of the numbers of a block.
+"""The part of a scene in an attempt, a step that may be rejected: its slopes as text, and the layout of `lanes`.
 
 All numbers of a block of trajectories are in one array, `lanes`, at offsets that the modules have as constants.
 """

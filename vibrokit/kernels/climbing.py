@@ -1,4 +1,4 @@
-"""Scores of states on a grid at several times, and which of them are the highest so far."""
+"""Climbing: the score of each trajectory, interpolated on a grid, and the highest one so far (splitting in MFET)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""All that kernels use of what Numba and llvmlite do not publish; `options` tests the version, and can do without.
+"""Deferred compilation: functions compiled only inside their callers, by parts of Numba that are not public.
+
+Kernels use private parts of Numba and llvmlite here and nowhere else. `options` tests the version, and can do without.
 
 Functions are compiled only as a part of those that call them, and each part is optimised once. Numba optimises each
 function together with all that it calls, and makes machine code of it, though only its callers use it. In a stepper of

@@ -1,4 +1,4 @@
-"""Calls from the driver of a kernel into the code of a scene, by address.
+"""Links: the driver of a kernel, shared by all scenes, calls the code of one scene by its address.
 
 A driver holds what scenes have in common: the loop over trajectories, the sums of a step, and the events. It compiles
 once for all of them, and finds the code of a scene through addresses that stand before the parameters in memory. Before

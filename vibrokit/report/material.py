@@ -1,4 +1,4 @@
-"""What a report is about: records of one scene, put together as far as they belong together."""
+"""The material of a report: records of one scene, merged into one assessment where they belong together."""
 
 from __future__ import annotations
 

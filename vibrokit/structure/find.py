@@ -1,4 +1,4 @@
-"""Finds what the noise-free system does: steady states, basins, saddles, manifolds."""
+"""find_structure: attractors, basins, saddles and manifolds of the motion without noise (see `finder`)."""
 
 from __future__ import annotations
 

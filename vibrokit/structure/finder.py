@@ -1,4 +1,4 @@
-"""Finder: goes through the stages of `find_structure`, and keeps what each has found."""
+"""Finder: the stages of `find_structure` (`search` for attractors, then basins, boundaries) with their results."""
 
 from __future__ import annotations
 

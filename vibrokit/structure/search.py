@@ -1,4 +1,4 @@
-"""The search for steady states: starts are followed until they recur; the others are followed for a long time."""
+"""The search for attractors: starts are followed until they recur; the others are followed for a long time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formulas of a scene as Python functions of numbers, for a few evaluations without compiled code."""
+"""Formulas of a scene as Python functions of numbers (SymPy's lambdify), for a few evaluations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Places where a formula switches, and its values beside them, for any values of its parameters."""
+"""Places where a formula switches, and its one-sided values there, for any values of its parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Traced paths: how they leave the attractor, and the action that they really have, from there to the exit."""
+"""TracedPath: the result of tracing, how it leaves the attractor, and its action apart from the grid."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Traced paths: from an exit target back to the attractor, step by step, then priced by Hamilton's equations."""
+"""Tracing: a path from an exit target back to the attractor, step by step on the grid."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Importance functions: how far a state is on its way out. Any of them gives unbiased rates."""
+"""Importance functions: scores by which splitting ranks states on their way out. Any of them gives unbiased rates."""
 
 from __future__ import annotations
 

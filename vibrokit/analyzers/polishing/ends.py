@@ -1,4 +1,4 @@
-"""Ends of paths: their conditions at the nodes of paths, and which of them can be used."""
+"""Nodes: candidates on the nodes of paths, the conditions of each end there, and which ends can be used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pairs of basins that meet on a grid, the lines between their cells, and groups of basins that saddles connect."""
+"""Meetings: which basins touch on a grid and where, and groups of basins that saddles connect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Turns of a steady motion next to the places where stops are first touched, seen from both sides."""
+"""Turning points (v = 0) of a steady motion near a stop: how far it is from grazing, on either side."""
 
 from __future__ import annotations
 
