@@ -36,7 +36,7 @@ class CandidatePolisher:
         self._solver = LegSolver(self.nodes, _left(nodes.problem, orbit))
         self._passing = PassingSearch(self.nodes)
         self._near: dict[Candidate, list[PathEnd]] = {}  # the ends that each comes near
-        self._unsolved: dict[Candidate, Effort] = {}  # the effort with which each led nowhere
+        self._unsolved: dict[Candidate, Effort] = {}  # the effort with which each did not lead to some end
         self._failed: defaultdict[PathEnd, list[Candidate]] = defaultdict(list)  # with all effort
 
     def polish(self, candidate: Candidate, effort: Effort) -> None:
@@ -54,21 +54,21 @@ class CandidatePolisher:
             if candidate.action > TOLERANCES.worth * self._known(candidate):
                 self.skipped += 1
                 return
-            failure = self._failure(candidate, effort)
-        except StructureError as error:
-            effort, failure = Effort.FROM_ORBIT, str(error)  # nothing can be done for it
-        if failure and effort < Effort.FROM_ORBIT:
+            failures, solved = self._tried(candidate, effort)
+        except StructureError as error:  # nothing can be done for it
+            effort, failures, solved = Effort.FROM_ORBIT, [str(error)], False
+        if failures and effort < Effort.FROM_ORBIT:
             self._unsolved[candidate] = effort
-        elif failure:
+        elif failures and not solved:
             self.findings.append(
                 Finding.of(
                     Code.CANDIDATE_FAILED, self.problem.source, candidate.target,
-                    action=candidate.action, finder=candidate.finder, reason=failure,
+                    action=candidate.action, finder=candidate.finder, reason=failures[0],
                 )
             )  # fmt: skip
 
-    def _failure(self, candidate: Candidate, effort: Effort) -> str:
-        """Why a candidate leads to no path; an empty text if it leads to one, or none is wanted."""
+    def _tried(self, candidate: Candidate, effort: Effort) -> tuple[list[str], bool]:
+        """Why a candidate leads to no path to some end, and whether it leads to another one, or is not wanted."""
         failures, solved = list[str](), False
         for end in self._near[candidate]:
             in_legs = self._solve_in_legs(end, candidate)
@@ -84,10 +84,10 @@ class CandidatePolisher:
                 for end in sorted(leading, key=lambda end: self.nodes.distance(end, candidate)):
                     if self._solve_in_legs(end, candidate):
                         break
-        return "" if solved else (*failures, "it comes near no end.")[0]
+        return failures if failures or solved else ["it comes near no end."], solved
 
     def polish_the_rest(self, effort: Effort) -> None:
-        """Polish what led nowhere with less effort.
+        """Polish what led to no path to some end with less effort.
 
         Only those that cost less than a known path are; a shot may cost more, as it does than the path near it, but
         with all effort it may not either.
