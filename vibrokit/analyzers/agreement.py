@@ -57,7 +57,7 @@ class ComparedExit:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Evidence:
-    """What is known of the exits of an attractor, and for which of them a finer graph is of use.
+    """Paths, graph and proven minima of the exits of an attractor, and which exits a finer graph can improve.
 
     Exits are named by the labels of the attractors they lead to.
     """
@@ -66,7 +66,7 @@ class Evidence:
     branches: tuple[ActivationEnergy, ...]  # polished, the cheapest first
     graph: GraphSolution | None = None
     least_possible: tuple[ActivationEnergy, ...] = ()
-    """What no path can cost less than, where that is known."""
+    """The proven minima, where they are known."""
     beyond: frozenset[int] = frozenset()
     """Labels of the attractors that only paths through other basins reach."""
 
@@ -77,7 +77,7 @@ class Evidence:
 
     @cached_property
     def estimates(self) -> tuple[ActivationEnergy, ...]:
-        """What the graph estimates; paths from or to orbits inside a set do not calibrate it: they give bounds."""
+        """The estimates of the graph. Paths from or to orbits inside a set do not calibrate it; they give bounds."""
         if self.graph is None or not self.attractor.repeats:
             return () if self.graph is None else self.graph.estimates
         return self.graph.calibrated([branch for branch in self.branches if branch.bound is not Bound.BRACKET])
@@ -88,7 +88,7 @@ class Evidence:
 
     @cached_property
     def exact(self) -> set[int]:
-        """Exits that cost what no path can cost less than."""
+        """Exits that attain the proven minimum."""
         return {target for target, state in self._states.items() if state in (ExitState.ATTAINED, ExitState.BARRIER)}
 
     def settled(self, accuracy: float) -> set[int]:

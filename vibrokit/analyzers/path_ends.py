@@ -74,7 +74,7 @@ class AtSaddle(PathEnd):
 class InBasin(PathEnd):
     """Any state of the target's basin, for a target that no known saddle leads to.
 
-    Raises StructureError if a target is no attractor: what is no basin has no such end.
+    Raises StructureError if a target is not an attractor, since only attractors have basins.
     """
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""GraphSolution: what the graph finds about the exits of one attractor; ExitCosts: how it comes together."""
+"""GraphSolution: the costs of the exits of one attractor, by the graph. ExitCosts: the search that refines them."""
 
 from __future__ import annotations
 
@@ -213,7 +213,7 @@ class ExitCosts:
             estimates |= {target: closer[target] for target in targets}
 
     def solution(self) -> GraphSolution:
-        """Return what is known of the targets, put together; something must have been solved."""
+        """Return the solution for all targets so far; at least one number of nodes must have been solved."""
         reached = [
             (target, estimate)
             for target, estimate in sorted(self.estimates.items(), key=lambda entry: entry[1].value)

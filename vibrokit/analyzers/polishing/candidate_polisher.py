@@ -43,8 +43,8 @@ class CandidatePolisher:
         """Polish a candidate to each end that it comes near, unless a far cheaper path is known.
 
         Without momenta it is at least brought to descend. A candidate of a grid may pass an orbit on its way to an end.
-        No path does that in finite time, so that it is polished in legs first. If no path is found, it is left for
-        `polish_the_rest`.
+        No path does that in finite time, so that it is polished in legs first. If it leads to no path to
+        some end, it is left for `polish_the_rest`.
         """
         effort = effort if candidate.momenta is not None else max(effort, Effort.DESCEND)
         self._unsolved.pop(candidate, None)
@@ -93,8 +93,8 @@ class CandidatePolisher:
         with all effort it may not either.
         """
         for candidate in sorted(self._unsolved, key=lambda each: each.action):
-            dearer = candidate.momenta is not None and effort < Effort.FROM_ORBIT
-            if self._unsolved[candidate] < effort and (dearer or candidate.action < self._known(candidate)):
+            may_cost_more = candidate.momenta is not None and effort < Effort.FROM_ORBIT
+            if self._unsolved[candidate] < effort and (may_cost_more or candidate.action < self._known(candidate)):
                 self.polish(candidate, effort)
 
     def reach(self, end: PathEnd, effort: Effort) -> None:
