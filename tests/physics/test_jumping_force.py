@@ -26,7 +26,7 @@ def kelvin_voigt(adhesive=False, noise=None):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("stepper", "adhesive"), zip(LOCATED, [False, True], strict=True), ids=str)
+@pytest.mark.parametrize(("stepper", "adhesive"), list(zip(LOCATED, [False, True], strict=True)), ids=str)
 def test_derivatives_are_those_of_the_map(stepper, adhesive):
     osc = kelvin_voigt(adhesive)
     start = np.array([0.3, 0.5])

@@ -107,8 +107,6 @@ class ExitRoad:
         """Polish what a source proposes."""
         found = self._asked(source, functools.partial(source.propose, self.problem, self._polished[0]))
         self._findings += source.findings
-        if not found and source.expected:
-            self._findings.append(Finding.of(Code.NOTHING_PROPOSED, self.problem.source, method=source.name))
         if source.attains:
             self._least = detailed_balance.with_paths(self.problem, self._least, found)
         waiting = self._polishings is not None and source.effort > Effort.SHOOT  # candidates of sources before
@@ -130,6 +128,9 @@ class ExitRoad:
             if alone and not found and self.solution is None:
                 raise told from error
             self._failed(source.name, str(told))
+        else:
+            if not found and source.expected:
+                self._findings.append(Finding.of(Code.NOTHING_PROPOSED, self.problem.source, method=source.name))
         return found
 
     def _polish(self, candidates: Sequence[Candidate], effort: Effort = Effort.FROM_ORBIT) -> None:
