@@ -41,6 +41,9 @@ from .parts.contact import Linear as Linear
 from .parts.excitation import Constant as Constant
 from .parts.excitation import Excitation as Excitation
 from .parts.excitation import Harmonic as Harmonic
+from .parts.friction import DryFriction as DryFriction
+from .parts.friction import Friction as Friction
+from .parts.friction import StribeckFriction as StribeckFriction
 from .parts.noise import NoiseModel as NoiseModel
 from .parts.noise import StateDependentNoise as StateDependentNoise
 from .parts.noise import WhiteNoise as WhiteNoise

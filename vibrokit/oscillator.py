@@ -39,7 +39,7 @@ Rng = int | np.random.Generator | None
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Oscillator(Scene):
-    """A vibro-impact oscillator, x″ + 2ζω_n x′ + spring(x, x′) = stops + Σ excitations + noise, per unit mass.
+    """A vibro-impact oscillator: x″ + 2ζω_n x′ + spring + friction = stops + Σ excitations + noise, per unit mass.
 
     Parameters as for `Scene`. The equations are derived on first access, and code is compiled on first integration.
 

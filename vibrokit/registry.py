@@ -21,6 +21,7 @@ class Group(StrEnum):
 
     CONTACT_LAWS = "vibrokit.contact_laws"
     SPRINGS = "vibrokit.springs"
+    FRICTIONS = "vibrokit.frictions"
     EXCITATIONS = "vibrokit.excitations"
     NOISE_MODELS = "vibrokit.noise_models"
     ANALYZERS = "vibrokit.analyzers"

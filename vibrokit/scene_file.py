@@ -17,6 +17,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.part import Part
 from vibrokit.parts.scene import Scene
@@ -28,7 +29,7 @@ _BUNDLED = Path(__file__).parent / "scenes"
 _LARGEST_FILE = 100_000
 _MOST_PARTS = 100
 _LONGEST_NAME = 100
-_KEYS = ("natural_frequency", "damping_ratio", "spring", "barriers", "excitations", "noise")
+_KEYS = ("natural_frequency", "damping_ratio", "spring", "friction", "barriers", "excitations", "noise")
 _BARRIER_KEYS = ("law", "position", "side", "adhesive")
 
 
@@ -145,6 +146,8 @@ def scene_data(scene: Scene) -> dict[str, Any]:
     data: dict[str, Any] = {"natural_frequency": scene.natural_frequency, "damping_ratio": scene.damping_ratio}
     if scene.spring is not None:
         data["spring"] = _part_data(Group.SPRINGS, scene.spring)
+    if scene.friction is not None:
+        data["friction"] = _part_data(Group.FRICTIONS, scene.friction)
     if scene.barriers:
         data["barriers"] = [_barrier_data(barrier) for barrier in scene.barriers]
     if scene.excitations:
@@ -166,18 +169,19 @@ def _barrier_data(barrier: Barrier) -> dict[str, Any]:
 def _named_parts(data: Mapping[str, Any]) -> list[tuple[Group, dict[str, Any]]]:
     found = [(Group.CONTACT_LAWS, barrier["law"]) for barrier in data.get("barriers", ())]
     found += [(Group.EXCITATIONS, values) for values in data.get("excitations", ())]
-    single = ((Group.SPRINGS, "spring"), (Group.NOISE_MODELS, "noise"))
+    single = ((Group.SPRINGS, "spring"), (Group.FRICTIONS, "friction"), (Group.NOISE_MODELS, "noise"))
     return found + [(group, data[key]) for group, key in single if key in data]
 
 
 def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
     """Return a checked oscillator from plain data."""
     _check_keys("scene", data, _KEYS, required=_KEYS[:2])
-    spring, noise = data.get("spring"), data.get("noise")
+    spring, friction, noise = (data.get(key) for key in ("spring", "friction", "noise"))
     return Oscillator(
         natural_frequency=data["natural_frequency"],
         damping_ratio=data["damping_ratio"],
         spring=None if spring is None else _part("spring", Group.SPRINGS, Spring, spring),
+        friction=None if friction is None else _part("friction", Group.FRICTIONS, Friction, friction),
         barriers=tuple(_barrier(f"barriers.{i}", b) for i, b in enumerate(_listed("barriers", data))),
         excitations=tuple(
             _part(f"excitations.{i}", Group.EXCITATIONS, Excitation, e)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import sympy
 
-from vibrokit import ContactLaw, Excitation, Hertz, NoiseModel, Spring, parameter
+from vibrokit import ContactLaw, Excitation, Friction, Hertz, NoiseModel, Spring, parameter
 from vibrokit.parts.functions import Rational, cos, sqrt
 
 
@@ -194,6 +194,19 @@ LAWS = [
 SPRINGS = [
     ("finite force", with_formula(Stiff, SpringWithAPole=lambda spring, x, v: spring.stiffness / x)),
 ]
+
+
+# -- friction -------------------------------------------------------------------------------------------------------
+
+
+class FrictionThatGrowsWithoutBound(Friction):
+    magnitude: float = parameter("f", "m s^-2", minimum=0.1)
+
+    def force(self, x, v):
+        return self.magnitude / v
+
+
+FRICTIONS = [("finite force", FrictionThatGrowsWithoutBound)]
 
 
 # -- excitations ----------------------------------------------------------------------------------------------------

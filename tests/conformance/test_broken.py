@@ -16,6 +16,7 @@ from vibrokit.testing import (
     check_contact_law,
     contact_law_checks,
     excitation_checks,
+    friction_checks,
     noise_model_checks,
     part_checks,
     spring_checks,
@@ -24,6 +25,7 @@ from vibrokit.testing import (
 KINDS = [
     (contact_law_checks, broken.LAWS),
     (spring_checks, broken.SPRINGS),
+    (friction_checks, broken.FRICTIONS),
     (excitation_checks, broken.EXCITATIONS),
     (noise_model_checks, broken.NOISE_MODELS),
 ]

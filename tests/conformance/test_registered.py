@@ -12,6 +12,7 @@ from vibrokit import testing
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.spring import Spring
 from vibrokit.registry import Group, load_all
@@ -22,6 +23,7 @@ pytestmark = pytest.mark.slow
 KINDS = [
     (Group.CONTACT_LAWS, ContactLaw, testing.contact_law_checks),
     (Group.SPRINGS, Spring, testing.spring_checks),
+    (Group.FRICTIONS, Friction, testing.friction_checks),
     (Group.EXCITATIONS, Excitation, testing.excitation_checks),
     (Group.NOISE_MODELS, NoiseModel, testing.noise_model_checks),
 ]

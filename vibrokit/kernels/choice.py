@@ -133,7 +133,7 @@ def _power_of_two(needed: float) -> int:
 
 def _flies(scene: Scene, flow: Flow) -> bool:
     """Whether all parts are built-in ones that FreeFlight accepts; decided without their formulas, for speed."""
-    linear = scene.spring is None or type(scene.spring) is LinearSpring
+    linear = scene.friction is None and (scene.spring is None or type(scene.spring) is LinearSpring)
     sinusoids = all(type(part) in (Harmonic, Constant) for part in scene.excitations)
     if scene.noise is None or type(scene.noise) is WhiteNoise:
         return linear and sinusoids

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.kernels.single import record
 from vibrokit.kernels.stepper import Stepper
+from vibrokit.parts.friction import Friction
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import Spring
 from vibrokit.symbolic.flow_kind import Flow
@@ -54,19 +55,21 @@ class FastForce(NamedTuple):
 def fastest_force(scene: Scene, state: Array) -> FastForce | None:
     """Return the force with the shortest time scale around a state; None where no force has one.
 
-    The time scale of a force f(x, v) is 1/(√|∂f/∂x| + |∂f/∂v|). For a spring only the slope in v counts. For a stop the
-    slopes are those at the depth of the state, or at a depth close to first touch if the mass is not in contact.
+    The time scale of a force f(x, v) is 1/(√|∂f/∂x| + |∂f/∂v|). For a spring and friction only the slope in v
+    counts. For a stop the slopes are those at the depth of the state, or at a depth close to first touch if the mass
+    is not in contact.
     """
     x, v = float(state[0]), float(state[1])
     speed = max(abs(v), scene.natural_frequency * abs(x), np.finfo(float).tiny)
-    found = [] if scene.spring is None else [_spring(scene.spring, x, v, speed)]
+    named = {"spring": scene.spring, "friction": scene.friction}
+    found = [_in_velocity(name, part, x, v, speed) for name, part in named.items() if part is not None]
     found += [_stop(scene, number, x, v, speed) for number in range(len(scene.barriers))]
     return min((force for force in found if force.time < math.inf), key=lambda force: force.time, default=None)
 
 
-def _spring(spring: Spring, x: float, v: float, speed: float) -> FastForce:
-    steepness = max(_slope(lambda rate: spring.force(x, rate), centre, speed) for centre in (0.0, v))
-    words = f"the spring force changes with the velocity at up to {steepness:.3g} s⁻¹"
+def _in_velocity(name: str, part: Spring | Friction, x: float, v: float, speed: float) -> FastForce:
+    steepness = max(_slope(lambda rate: part.force(x, rate), centre, speed) for centre in (0.0, v))
+    words = f"the force of the {name} changes with the velocity at up to {steepness:.3g} s⁻¹"
     return FastForce(words, 1.0 / steepness if steepness > 0.0 else math.inf, True)
 
 

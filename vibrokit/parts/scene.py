@@ -14,6 +14,7 @@ from vibrokit.construction import Constructed, called
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.spring import Spring
@@ -36,7 +37,7 @@ class Entry(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Scene(metaclass=Constructed):
-    """The parts of one oscillator, x″ + 2ζω_n x′ + spring = stops + Σ excitations + noise.
+    """The parts of one oscillator, x″ + 2ζω_n x′ + spring + friction = stops + Σ excitations + noise.
 
     Parameters
     ----------
@@ -49,6 +50,8 @@ class Scene(metaclass=Constructed):
     excitations : sequence of Excitation
     noise : NoiseModel, optional
     spring : Spring, optional
+    friction : Friction, optional
+        Besides the damping.
 
     Raises
     ------
@@ -62,6 +65,7 @@ class Scene(metaclass=Constructed):
     excitations: tuple[Excitation, ...] = ()
     noise: NoiseModel | None = None
     spring: Spring | None = None
+    friction: Friction | None = None
 
     def __post_init__(self) -> None:
         for declared in _OWN:
@@ -74,6 +78,8 @@ class Scene(metaclass=Constructed):
             _check_names(self.noise)
         if self.spring is not None:
             _checked_parts("spring", (self.spring,), Spring)
+        if self.friction is not None:
+            _checked_parts("friction", (self.friction,), Friction)
         self._check_stops()
         self._check_periods()
 
@@ -113,6 +119,7 @@ class Scene(metaclass=Constructed):
     def placed_parts(self) -> list[tuple[str, Any]]:
         """Return the stops and all parts with their paths, in the order of `entries`."""
         placed: list[tuple[str, Any]] = [] if self.spring is None else [("spring", self.spring)]
+        placed += [] if self.friction is None else [("friction", self.friction)]
         for index, barrier in enumerate(self.barriers):
             placed += [(f"barriers.{index}", barrier), (f"barriers.{index}.law", barrier.law)]
         placed += [(f"excitations.{index}", part) for index, part in enumerate(self.excitations)]

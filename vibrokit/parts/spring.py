@@ -19,9 +19,8 @@ class Spring(Part):
     def force(self, x: Any, v: Any) -> Any:
         """Force (m s⁻²) at displacement `x` (m) and velocity `v` (m s⁻¹), as a SymPy expression.
 
-        It must not jump in `v`, as dry friction does: write f*tanh(v/w) for f*sign(v), with a small width w. Nor in
-        `x`: there, a stop may have the jump at first touch. The derivation of the equations raises DerivationError
-        otherwise.
+        It must not jump in `v`, as dry friction does, which `DryFriction` has in a smooth form. Nor in `x`: there, a
+        stop may have the jump at first touch. The derivation of the equations raises DerivationError otherwise.
         """
 
 
@@ -67,7 +66,7 @@ class CustomSpring(FormulaPart, Spring):
 
     Motion ends at the poles of the formula and at the edges of its domain.
 
-    Dry friction is given in a smooth form: ``f*tanh(v/w)`` with a small width w, not ``f*sign(v)``, which is refused.
+    Dry friction, ``f*sign(v)``, is refused; `DryFriction` has it in a smooth form.
 
     Parameters
     ----------

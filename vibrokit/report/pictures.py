@@ -40,7 +40,7 @@ def scene_picture(osc: Oscillator) -> Picture:
     """Return the drawing of a scene with its values."""
     drawn = scene_drawing(
         spring=_value_text("ω_n", osc.natural_frequency, "s^-1") if osc.spring is None else _part_text(osc.spring),
-        damper=f"ζ = {osc.damping_ratio:.6g}",
+        damper=f"ζ = {osc.damping_ratio:.6g}" + ("" if osc.friction is None else f"\n{_part_text(osc.friction)}"),
         stops=[(one.side, f"at {_value_text('x', one.position, 'm')}\n{_part_text(one.law)}") for one in osc.barriers],
         forces=[_part_text(part) for part in osc.excitations],
         noise="" if osc.noise is None else _part_text(osc.noise),

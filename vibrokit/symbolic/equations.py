@@ -8,7 +8,9 @@ from functools import cached_property
 import sympy
 
 from vibrokit.errors import DerivationError
+from vibrokit.parts.friction import Friction
 from vibrokit.parts.scene import Scene
+from vibrokit.parts.spring import Spring
 from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact, refuse_steep_touch
 from vibrokit.symbolic.formulas import derived_formula, derived_rates
@@ -77,30 +79,44 @@ class Equations:
         """Acceleration without stops and without time-dependent excitations."""
         x, v, *extra = self.state
         omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
-        spring = omega**2 * x if self.scene.spring is None else self._spring_force
+        spring = omega**2 * x if self.scene.spring is None else 0
         constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
         push = self._noise_formula("force", tuple(extra)) if extra else 0
-        return -2 * zeta * omega * v - spring + constant + push
+        return -2 * zeta * omega * v - spring - sum(self._forces_of_state.values()) + constant + push
 
     @cached_property
-    def _spring_force(self) -> sympy.Expr:
-        """Force of the spring that is given."""
-        spring, symbols, (x, v) = self.scene.spring, self._symbols_of("spring"), self.state[:2]
-        force = without_removable(derived_formula(spring, "force", symbols, (x, v)), (x, v))
-        refuse_jumps(spring, force, (v,), symbols, self.scene.natural_frequency)
+    def _forces_of_state(self) -> dict[str, sympy.Expr]:
+        """The force of the spring and of friction, those that are given, by their paths."""
+        return {path: self._force_of_state(path, part) for path, part in self._parts_of_state.items()}
+
+    @property
+    def _parts_of_state(self) -> dict[str, Spring | Friction]:
+        named = {"spring": self.scene.spring, "friction": self.scene.friction}
+        return {path: part for path, part in named.items() if part is not None}
+
+    def _force_of_state(self, path: str, part: Spring | Friction) -> sympy.Expr:
+        symbols, (x, v) = self._symbols_of(path), self.state[:2]
+        force = without_removable(derived_formula(part, "force", symbols, (x, v)), (x, v))
+        refuse_jumps(part, force, (v,), symbols, self.scene.natural_frequency)
         return force
 
     @cached_property
+    def _roughnesses(self) -> dict[str, Roughness]:
+        """Where the force of the spring and that of friction are least smooth."""
+        return {
+            path: roughness_of(part, self._forces_of_state[path], self.state[:2], self._symbols_of(path))
+            for path, part in self._parts_of_state.items()
+        }
+
+    @property
     def roughness(self) -> Roughness:
-        """Where the force of the spring is least smooth."""
-        if self.scene.spring is None:
-            return Roughness()
-        return roughness_of(self.scene.spring, self._spring_force, self.state[:2], self._symbols_of("spring"))
+        """Where the forces of spring and friction are least smooth."""
+        return min(self._roughnesses.values(), key=lambda found: found.power, default=Roughness())
 
     def check_derivatives(self) -> None:
         """Raise DerivationError if derivatives of the motion, or momenta, cannot be followed under a force."""
-        if self.scene.spring is not None:
-            refuse_rough(self.scene.spring, self._spring_force, self.roughness, self._symbols_of("spring"))
+        for path, part in self._parts_of_state.items():
+            refuse_rough(part, self._forces_of_state[path], self._roughnesses[path], self._symbols_of(path))
         for contact in self.contacts:
             refuse_steep_touch(contact)
 

@@ -81,7 +81,7 @@ def _suffix(scene: Scene, entry: Entry) -> str:
         return scene.barriers[int(rest[0])].side[0]
     if head == "excitations":
         return rest[0]
-    return {"spring": "s", "noise": "xi"}.get(head, "")
+    return {"spring": "s", "friction": "mu", "noise": "xi"}.get(head, "")
 
 
 def _assumptions(entry: Entry) -> dict[str, Any]:

@@ -21,11 +21,12 @@ from typing import Any
 from vibrokit.errors import UnknownNameError, nearest
 from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.spring import Spring
 from vibrokit.registry import load, names
 from vibrokit.testing.contact import ContactLawChecks
-from vibrokit.testing.kinds import ExcitationChecks, NoiseModelChecks, SpringChecks
+from vibrokit.testing.kinds import ExcitationChecks, FrictionChecks, NoiseModelChecks, SpringChecks
 from vibrokit.testing.part_checks import PartChecks, Rng
 from vibrokit.testing.report import Check, ConformanceError, Outcome, Report, raise_failures, run_checks
 
@@ -37,15 +38,23 @@ __all__ = [
     "check",
     "check_contact_law",
     "check_excitation",
+    "check_friction",
     "check_noise_model",
     "check_spring",
     "contact_law_checks",
     "excitation_checks",
+    "friction_checks",
     "noise_model_checks",
     "spring_checks",
 ]
 
-_KINDS: tuple[type[PartChecks[Any]], ...] = (ContactLawChecks, SpringChecks, ExcitationChecks, NoiseModelChecks)
+_KINDS: tuple[type[PartChecks[Any]], ...] = (
+    ContactLawChecks,
+    SpringChecks,
+    FrictionChecks,
+    ExcitationChecks,
+    NoiseModelChecks,
+)
 
 
 def check_contact_law(law: ContactLaw | type[ContactLaw], *, rng: Rng = 0) -> Report:
@@ -76,6 +85,11 @@ def check_spring(spring: Spring | type[Spring], *, rng: Rng = 0) -> Report:
     return raise_failures(_report(SpringChecks(spring, rng)))
 
 
+def check_friction(friction: Friction | type[Friction], *, rng: Rng = 0) -> Report:
+    """Check a friction; arguments, result and errors as for `check_contact_law`."""
+    return raise_failures(_report(FrictionChecks(friction, rng)))
+
+
 def check_excitation(excitation: Excitation | type[Excitation], *, rng: Rng = 0) -> Report:
     """Check an excitation; arguments, result and errors as for `check_contact_law`."""
     return raise_failures(_report(ExcitationChecks(excitation, rng)))
@@ -94,6 +108,11 @@ def contact_law_checks(law: ContactLaw | type[ContactLaw], *, rng: Rng = 0) -> t
 def spring_checks(spring: Spring | type[Spring], *, rng: Rng = 0) -> tuple[Check, ...]:
     """Return the checks of `check_spring`, each a pair (name, function that raises ConformanceError)."""
     return SpringChecks(spring, rng).checks()
+
+
+def friction_checks(friction: Friction | type[Friction], *, rng: Rng = 0) -> tuple[Check, ...]:
+    """Return the checks of `check_friction`, each a pair (name, function that raises ConformanceError)."""
+    return FrictionChecks(friction, rng).checks()
 
 
 def excitation_checks(excitation: Excitation | type[Excitation], *, rng: Rng = 0) -> tuple[Check, ...]:

@@ -1,7 +1,8 @@
-"""Checks of springs, excitations and noise models."""
+"""Checks of springs, friction, excitations and noise models."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from typing import Any, ClassVar
@@ -13,6 +14,7 @@ import sympy
 from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.excitation import Excitation, Harmonic
+from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel, WhiteNoise
 from vibrokit.parts.spring import CubicSpring, Spring
 from vibrokit.registry import Group
@@ -29,13 +31,10 @@ from vibrokit.testing.report import Check, ConformanceError
 _STATE = (sympy.Symbol("x", real=True), sympy.Symbol("v", real=True))
 
 
-class SpringChecks(PartChecks[Spring]):
-    """The checks of one spring."""
+class StateForceChecks(PartChecks[Spring | Friction]):
+    """The checks of a force that depends on the state: of a spring, or of friction."""
 
-    kind: ClassVar[type[Spring]] = Spring
-    group = Group.SPRINGS
     arguments = _STATE
-    place = "spring"
 
     def physics(self) -> tuple[Check, ...]:
         return (
@@ -44,19 +43,44 @@ class SpringChecks(PartChecks[Spring]):
             Check("compiled", self.compiled),
         )
 
-    def scene(self, part: Spring) -> Oscillator:
-        return Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=part, excitations=(Harmonic(0.2, 0.9),))
+    def scene(self, part: Spring | Friction) -> Oscillator:
+        scene = Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(Harmonic(0.2, 0.9),))
+        parts: dict[str, Any] = {self.place: part}
+        return dataclasses.replace(scene, **parts)
 
-    def compiled_distances(self, part: Spring) -> Iterator[float]:
-        scene = Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=part, noise=WhiteNoise(intensity=1.0))
+    def compiled_distances(self, part: Spring | Friction) -> Iterator[float]:
+        scene = Oscillator(
+            natural_frequency=1.0,
+            damping_ratio=0.0,
+            spring=CubicSpring(linear=0.0, cubic=0.0),
+            noise=WhiteNoise(intensity=1.0),
+        )
+        parts: dict[str, Any] = {self.place: part}
+        scene = dataclasses.replace(scene, **parts)
         code = Compiled(scene, Flow.HAMILTONIAN_VARIATIONAL)
         formula = self.expression(part)
         for orders, (index, momentum, factor) in ENTRIES.items():
             reference = self.reference(part, derivative(formula, self.arguments, orders))
             for point in self.points():
-                for rates in (code.derivative, code.rhs):  # the force on the mass is minus that of the spring
+                for rates in (code.derivative, code.rhs):  # the force on the mass is minus that of the part
                     found = rates(hamiltonian_start(point, momentum))[index]
                     yield reference.check(f"the derivative of orders {orders} of {part!r}", point, found, -factor)
+
+
+class SpringChecks(StateForceChecks):
+    """The checks of one spring."""
+
+    kind: ClassVar[type[Spring]] = Spring
+    group = Group.SPRINGS
+    place = "spring"
+
+
+class FrictionChecks(StateForceChecks):
+    """The checks of one friction."""
+
+    kind: ClassVar[type[Friction]] = Friction
+    group = Group.FRICTIONS
+    place = "friction"
 
 
 class ExcitationChecks(PartChecks[Excitation]):
