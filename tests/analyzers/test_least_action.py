@@ -292,6 +292,7 @@ def test_a_source_that_proposes_nothing_is_a_finding_and_one_that_fails_alone_an
     found = ExitRoad(problem, [Nothing(()), Nothing(None), StraightLine()]).run()
     assert found.estimates[0].value == pytest.approx(EXACT, rel=1e-6)
     codes = [finding.code for finding in found.findings]
+    assert codes[:2] == TOLD
     assert [code for code in codes if code in TOLD] == TOLD
     with pytest.raises(StructureError, match="TypeError"):
         ExitRoad(problem, [Nothing(None)]).run()

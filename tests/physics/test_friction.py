@@ -22,7 +22,7 @@ def test_each_swing_loses_twice_the_same_length():
 
 
 def test_sliding_without_stop_has_the_amplitude_of_den_hartog():
-    """Source: Den Hartog, *Trans. ASME* 53 (1931) APM-107-9, eq. 12, for motion without sticking, r = ω/ω_n."""
+    """Source: Den Hartog, *Trans. ASME* 53 (1931) APM-107-9, for motion without sticking, r = ω/ω_n."""
     amplitude, friction, ratio = 1.0, 0.2, 0.6
     osc = vk.Oscillator(
         natural_frequency=1.0,

@@ -114,7 +114,10 @@ class ExitRoad:
             self._polish(found, source.effort)
 
     def _asked(self, source: Source, propose: Callable[[], Iterable[Candidate]]) -> Sequence[Candidate]:
-        """What a source proposes until an error, which is a finding; raised if nothing else searches or is known."""
+        """Return the candidates of a source up to its first error. The error is a finding.
+
+        It is raised if no other source searches and nothing is known.
+        """
         found = list[Candidate]()
         try:
             for candidate in propose():

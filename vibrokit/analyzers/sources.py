@@ -59,12 +59,12 @@ class Source(ABC):
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Iterable[Candidate]:
         """Return guesses of exit paths; `polished` are the paths that are known, the cheapest first.
 
-        What it raises is a finding, and what it proposed before is used.
+        An error is a finding. The candidates before it are used.
         """
 
 
 def check_proposal(candidate: Candidate, problem: ExitProblem) -> None:
-    """Refuse what is no guess of an exit path of this attractor.
+    """Check that a candidate is a guess of an exit path of this attractor.
 
     Raises
     ------

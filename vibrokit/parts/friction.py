@@ -22,7 +22,7 @@ class Friction(Part):
 
     @abstractmethod
     def force(self, x: Any, v: Any) -> Any:
-        """Force (m s⁻²) at displacement `x` (m) and velocity `v` (m s⁻¹), as a SymPy expression; positive if v is."""
+        """Force (m s⁻²) at displacement `x` (m) and velocity `v` (m s⁻¹), as a SymPy expression."""
 
 
 class DryFriction(Friction):
@@ -51,7 +51,7 @@ class DryFriction(Friction):
 class StribeckFriction(Friction):
     """Dry friction that falls with the speed of sliding s = v − u: (f + (f_s − f) exp(−(s/v_s)²)) tanh(s/w).
 
-    Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, *Automatica* 30 (1994) 1083, eq. 3, with a Gaussian fall.
+    Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, *Automatica* 30 (1994) 1083.
 
     Parameters
     ----------
