@@ -7,6 +7,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.errors import FileError, SceneError
+from vibrokit.parts.single_parts import SINGLE_PARTS
 from vibrokit.results import atomic
 from vibrokit.scene_file import bundled_scenes, scene_data, scene_from_data
 
@@ -16,6 +17,7 @@ def everything():
         natural_frequency=1.0,
         damping_ratio=0.1,
         spring=vk.CustomSpring("a*x + b*x**3", a=1.0, b=1e-300),
+        friction=vk.StribeckFriction(magnitude=0.1, static=0.2, decay=0.3, width=1e-3),
         barriers=(
             vk.Barrier(vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=50.0, c=1 / 3), 0.5, "right", adhesive=True),
             vk.Barrier(vk.Linear(1e22), -0.1, "left"),
@@ -39,6 +41,7 @@ class TestRoundTrip:
 
     def test_plain_data(self):
         assert scene_from_data(scene_data(everything())) == everything()
+        assert set(SINGLE_PARTS) < set(scene_data(everything()))
 
     def test_least(self, tmp_path):
         osc = vk.Oscillator(natural_frequency=1, damping_ratio=0)

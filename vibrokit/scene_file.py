@@ -17,11 +17,9 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.excitation import Excitation
-from vibrokit.parts.friction import Friction
-from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.part import Part
 from vibrokit.parts.scene import Scene
-from vibrokit.parts.spring import Spring
+from vibrokit.parts.single_parts import SINGLE_PARTS
 from vibrokit.registry import Group, load, name_of
 from vibrokit.results.atomic import write_atomically
 
@@ -30,6 +28,7 @@ _LARGEST_FILE = 100_000
 _MOST_PARTS = 100
 _LONGEST_NAME = 100
 _KEYS = ("natural_frequency", "damping_ratio", "spring", "friction", "barriers", "excitations", "noise")
+_GROUPS = {"spring": Group.SPRINGS, "friction": Group.FRICTIONS, "noise": Group.NOISE_MODELS}  # of `SINGLE_PARTS`
 _BARRIER_KEYS = ("law", "position", "side", "adhesive")
 
 
@@ -144,17 +143,12 @@ def scene_text(scene: Scene) -> str:
 def scene_data(scene: Scene) -> dict[str, Any]:
     """Return a scene as the plain data of a scene file. A class that is not registered is named module:Class."""
     data: dict[str, Any] = {"natural_frequency": scene.natural_frequency, "damping_ratio": scene.damping_ratio}
-    if scene.spring is not None:
-        data["spring"] = _part_data(Group.SPRINGS, scene.spring)
-    if scene.friction is not None:
-        data["friction"] = _part_data(Group.FRICTIONS, scene.friction)
+    data |= {name: _part_data(_GROUPS[name], part) for name, part in scene.single_parts.items()}
     if scene.barriers:
         data["barriers"] = [_barrier_data(barrier) for barrier in scene.barriers]
     if scene.excitations:
         data["excitations"] = [_part_data(Group.EXCITATIONS, part) for part in scene.excitations]
-    if scene.noise is not None:
-        data["noise"] = _part_data(Group.NOISE_MODELS, scene.noise)
-    return data
+    return {key: data[key] for key in _KEYS if key in data}
 
 
 def _part_data(group: Group, part: Part) -> dict[str, Any]:
@@ -169,25 +163,22 @@ def _barrier_data(barrier: Barrier) -> dict[str, Any]:
 def _named_parts(data: Mapping[str, Any]) -> list[tuple[Group, dict[str, Any]]]:
     found = [(Group.CONTACT_LAWS, barrier["law"]) for barrier in data.get("barriers", ())]
     found += [(Group.EXCITATIONS, values) for values in data.get("excitations", ())]
-    single = ((Group.SPRINGS, "spring"), (Group.FRICTIONS, "friction"), (Group.NOISE_MODELS, "noise"))
-    return found + [(group, data[key]) for group, key in single if key in data]
+    return found + [(group, data[name]) for name, group in _GROUPS.items() if name in data]
 
 
 def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
     """Return a checked oscillator from plain data."""
     _check_keys("scene", data, _KEYS, required=_KEYS[:2])
-    spring, friction, noise = (data.get(key) for key in ("spring", "friction", "noise"))
+    given = {name: data[name] for name in _GROUPS if data.get(name) is not None}
     return Oscillator(
         natural_frequency=data["natural_frequency"],
         damping_ratio=data["damping_ratio"],
-        spring=None if spring is None else _part("spring", Group.SPRINGS, Spring, spring),
-        friction=None if friction is None else _part("friction", Group.FRICTIONS, Friction, friction),
         barriers=tuple(_barrier(f"barriers.{i}", b) for i, b in enumerate(_listed("barriers", data))),
         excitations=tuple(
             _part(f"excitations.{i}", Group.EXCITATIONS, Excitation, e)
             for i, e in enumerate(_listed("excitations", data))
         ),
-        noise=None if noise is None else _part("noise", Group.NOISE_MODELS, NoiseModel, noise),
+        **{name: _part(name, _GROUPS[name], SINGLE_PARTS[name], values) for name, values in given.items()},
     )
 
 

@@ -148,7 +148,7 @@ class TestParameters:
         assert message.endswith(".")
         assert len(message) < 600
 
-    @pytest.mark.parametrize("field", ["barriers", "excitations", "noise", "spring"])
+    @pytest.mark.parametrize("field", ["barriers", "excitations", "noise", "spring", "friction"])
     def test_fields_are_checked(self, full, field):
         with pytest.raises(SceneError, match=f"scene: {field} "):
             full.replace(**{field: 1.0})

@@ -61,8 +61,7 @@ def fastest_force(scene: Scene, state: Array) -> FastForce | None:
     """
     x, v = float(state[0]), float(state[1])
     speed = max(abs(v), scene.natural_frequency * abs(x), np.finfo(float).tiny)
-    named = {"spring": scene.spring, "friction": scene.friction}
-    found = [_in_velocity(name, part, x, v, speed) for name, part in named.items() if part is not None]
+    found = [_in_velocity(name, part, x, v, speed) for name, part in scene.forces_of_state.items()]
     found += [_stop(scene, number, x, v, speed) for number in range(len(scene.barriers))]
     return min((force for force in found if force.time < math.inf), key=lambda force: force.time, default=None)
 

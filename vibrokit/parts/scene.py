@@ -17,6 +17,7 @@ from vibrokit.parts.excitation import Excitation
 from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.parameter import Parameter
+from vibrokit.parts.single_parts import FORCES_OF_STATE, SINGLE_PARTS
 from vibrokit.parts.spring import Spring
 
 _OWN = (
@@ -73,13 +74,10 @@ class Scene(metaclass=Constructed):
             object.__setattr__(self, declared.name, value)
         object.__setattr__(self, "barriers", _checked_parts("barriers", self.barriers, Barrier))
         object.__setattr__(self, "excitations", _checked_parts("excitations", self.excitations, Excitation))
+        for name, part in self.single_parts.items():
+            _checked_parts(name, (part,), SINGLE_PARTS[name])
         if self.noise is not None:
-            _checked_parts("noise", (self.noise,), NoiseModel)
             _check_names(self.noise)
-        if self.spring is not None:
-            _checked_parts("spring", (self.spring,), Spring)
-        if self.friction is not None:
-            _checked_parts("friction", (self.friction,), Friction)
         self._check_stops()
         self._check_periods()
 
@@ -107,6 +105,16 @@ class Scene(metaclass=Constructed):
                     f"for a constant force, or math.inf for one that never repeats, got {shown(period)}."
                 )
 
+    @property
+    def single_parts(self) -> dict[str, Any]:
+        """The parts of `SINGLE_PARTS` that are given, by field."""
+        return {name: part for name in SINGLE_PARTS if (part := getattr(self, name)) is not None}
+
+    @property
+    def forces_of_state(self) -> dict[str, Spring | Friction]:
+        """The spring and the friction, those that are given, by field."""
+        return {name: part for name, part in self.single_parts.items() if name in FORCES_OF_STATE}
+
     @functools.cached_property
     def entries(self) -> tuple[Entry, ...]:
         """Every parameter with its path, in the order of the parameter array of compiled code."""
@@ -118,8 +126,7 @@ class Scene(metaclass=Constructed):
 
     def placed_parts(self) -> list[tuple[str, Any]]:
         """Return the stops and all parts with their paths, in the order of `entries`."""
-        placed: list[tuple[str, Any]] = [] if self.spring is None else [("spring", self.spring)]
-        placed += [] if self.friction is None else [("friction", self.friction)]
+        placed: list[tuple[str, Any]] = [*self.forces_of_state.items()]
         for index, barrier in enumerate(self.barriers):
             placed += [(f"barriers.{index}", barrier), (f"barriers.{index}.law", barrier.law)]
         placed += [(f"excitations.{index}", part) for index, part in enumerate(self.excitations)]

@@ -87,12 +87,7 @@ class Equations:
     @cached_property
     def _forces_of_state(self) -> dict[str, sympy.Expr]:
         """The force of the spring and of friction, those that are given, by their paths."""
-        return {path: self._force_of_state(path, part) for path, part in self._parts_of_state.items()}
-
-    @property
-    def _parts_of_state(self) -> dict[str, Spring | Friction]:
-        named = {"spring": self.scene.spring, "friction": self.scene.friction}
-        return {path: part for path, part in named.items() if part is not None}
+        return {path: self._force_of_state(path, part) for path, part in self.scene.forces_of_state.items()}
 
     def _force_of_state(self, path: str, part: Spring | Friction) -> sympy.Expr:
         symbols, (x, v) = self._symbols_of(path), self.state[:2]
@@ -105,7 +100,7 @@ class Equations:
         """Where the force of the spring and that of friction are least smooth."""
         return {
             path: roughness_of(part, self._forces_of_state[path], self.state[:2], self._symbols_of(path))
-            for path, part in self._parts_of_state.items()
+            for path, part in self.scene.forces_of_state.items()
         }
 
     @property
@@ -115,7 +110,7 @@ class Equations:
 
     def check_derivatives(self) -> None:
         """Raise DerivationError if derivatives of the motion, or momenta, cannot be followed under a force."""
-        for path, part in self._parts_of_state.items():
+        for path, part in self.scene.forces_of_state.items():
             refuse_rough(part, self._forces_of_state[path], self._roughnesses[path], self._symbols_of(path))
         for contact in self.contacts:
             refuse_steep_touch(contact)
