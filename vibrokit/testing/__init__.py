@@ -26,9 +26,11 @@ from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.spring import Spring
 from vibrokit.registry import load, names
 from vibrokit.testing.contact import ContactLawChecks
-from vibrokit.testing.kinds import ExcitationChecks, FrictionChecks, NoiseModelChecks, SpringChecks
+from vibrokit.testing.excitations import ExcitationChecks
+from vibrokit.testing.noise import NoiseModelChecks
 from vibrokit.testing.part_checks import PartChecks, Rng
 from vibrokit.testing.report import Check, ConformanceError, Outcome, Report, raise_failures, run_checks
+from vibrokit.testing.state_forces import FrictionChecks, SpringChecks
 
 __all__ = [
     "Check",

@@ -1,9 +1,7 @@
-"""Checks of springs, friction, excitations and noise models."""
+"""Checks of noise models."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -13,142 +11,18 @@ import sympy
 
 from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.excitation import Excitation, Harmonic
-from vibrokit.parts.friction import Friction
-from vibrokit.parts.noise import NoiseModel, WhiteNoise
-from vibrokit.parts.spring import CubicSpring, Spring
+from vibrokit.parts.excitation import Harmonic
+from vibrokit.parts.noise import NoiseModel
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow import derive_flow
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.formulas import derived_formula
 from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import printable
-from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
+from vibrokit.testing.compiled import Compiled
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.precise import Reference, derivative
 from vibrokit.testing.report import Check, ConformanceError
-
-_STATE = (sympy.Symbol("x", real=True), sympy.Symbol("v", real=True))
-
-
-class StateForceChecks(PartChecks[Spring | Friction]):
-    """The checks of a force that depends on the state: of a spring, or of friction."""
-
-    arguments = _STATE
-
-    def physics(self) -> tuple[Check, ...]:
-        return (
-            Check("finite force", self.finite),
-            Check("derivatives", self.derivatives),
-            Check("compiled", self.compiled),
-        )
-
-    def scene(self, part: Spring | Friction) -> Oscillator:
-        scene = Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(Harmonic(0.2, 0.9),))
-        parts: dict[str, Any] = {self.place: part}
-        return dataclasses.replace(scene, **parts)
-
-    def compiled_distances(self, part: Spring | Friction) -> Iterator[float]:
-        scene = Oscillator(
-            natural_frequency=1.0,
-            damping_ratio=0.0,
-            spring=CubicSpring(linear=0.0, cubic=0.0),
-            noise=WhiteNoise(intensity=1.0),
-        )
-        parts: dict[str, Any] = {self.place: part}
-        scene = dataclasses.replace(scene, **parts)
-        code = Compiled(scene, Flow.HAMILTONIAN_VARIATIONAL)
-        formula = self.expression(part)
-        for orders, (index, momentum, factor) in ENTRIES.items():
-            reference = self.reference(part, derivative(formula, self.arguments, orders))
-            for point in self.points():
-                for rates in (code.derivative, code.rhs):  # the force on the mass is minus that of the part
-                    found = rates(hamiltonian_start(point, momentum))[index]
-                    yield reference.check(f"the derivative of orders {orders} of {part!r}", point, found, -factor)
-
-
-class SpringChecks(StateForceChecks):
-    """The checks of one spring."""
-
-    kind: ClassVar[type[Spring]] = Spring
-    group = Group.SPRINGS
-    place = "spring"
-
-
-class FrictionChecks(StateForceChecks):
-    """The checks of one friction."""
-
-    kind: ClassVar[type[Friction]] = Friction
-    group = Group.FRICTIONS
-    place = "friction"
-
-
-class ExcitationChecks(PartChecks[Excitation]):
-    """The checks of one excitation."""
-
-    kind: ClassVar[type[Excitation]] = Excitation
-    group = Group.EXCITATIONS
-    arguments = (sympy.Symbol("t", real=True),)
-    place = "excitations.0"
-    reach, count = 50.0, 20
-
-    def physics(self) -> tuple[Check, ...]:
-        return (
-            Check("finite force", self.finite),
-            Check("period", self.period),
-            Check("compiled", self.compiled),
-        )
-
-    def scene(self, part: Excitation) -> Oscillator:
-        return Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(part,))
-
-    def period(self) -> str:
-        """The force repeats after a finite `period`; a `period` of None means a constant force."""
-        periods = []
-        for part in self.samples:
-            period = self._declared_period(part)
-            periods.append("constant" if period is None else f"{period:.6g} s")
-            if period == math.inf:
-                continue
-            force = self.reference(part).exact
-            shift = math.pi if period is None else period
-            times = [mpmath.mpf(k) * shift / 37 for k in range(-37, 370, 11)]  # ten periods
-            size = max(abs(force(t)) for t in times)
-            for t in times:
-                change = abs(force(t + shift) - force(t))
-                if change > 1e-12 * size:
-                    raise ConformanceError(
-                        f"{part!r} has the period {period}, but its force changes by {mpmath.nstr(change, 6)} from t = "
-                        f"{mpmath.nstr(t, 6)} to {mpmath.nstr(t + shift, 6)}; return a period of the force, or None if "
-                        "it is constant."
-                    )
-        return ", ".join(dict.fromkeys(periods))
-
-    @staticmethod
-    def _declared_period(part: Excitation) -> float | None:
-        try:
-            period = part.period
-        except Exception as error:
-            raise ConformanceError(f"{part!r}.period raises {type(error).__name__}: {error}.") from error
-        if period is not None and not (isinstance(period, (int, float)) and period > 0):
-            raise ConformanceError(
-                f"{part!r}.period must be a positive number of seconds, None for a constant force, or math.inf for one "
-                f"that never repeats, got {period!r}."
-            )
-        return period
-
-    def compiled_distances(self, part: Excitation) -> Iterator[float]:
-        scene = Oscillator(
-            natural_frequency=1.0,
-            damping_ratio=0.0,
-            spring=CubicSpring(linear=0.0, cubic=0.0),
-            excitations=(part,),
-        )
-        code, reference, start = Compiled(scene, Flow.STATE), self.reference(part), (0.0, 0.0)
-        for (time,) in self.points():
-            forcing = code.call("forcing", time) if code.has("forcing") else 0.0
-            for found in (code.derivative(start, forcing)[1], code.rhs(start, time=time)[1]):
-                yield reference.check(f"the force of {part!r}", (time,), found)
 
 
 class NoiseModelChecks(PartChecks[NoiseModel]):
@@ -157,7 +31,7 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
     kind: ClassVar[type[NoiseModel]] = NoiseModel
     group = Group.NOISE_MODELS
     method = "amplitude"
-    arguments = _STATE
+    arguments = (sympy.Symbol("x", real=True), sympy.Symbol("v", real=True))
     place = "noise"
 
     def physics(self) -> tuple[Check, ...]:
