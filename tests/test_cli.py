@@ -419,13 +419,6 @@ def test_equations(capsys):
     assert r"\dot{x}" in capsys.readouterr().out
 
 
-def test_list(capsys):
-    assert main(["list"]) == 0
-    out = capsys.readouterr().out
-    names = "hertz linear custom cubic harmonic white action-plot hertz-0.525 first-contact least_action"
-    assert [name for name in names.split() if name not in out] == []
-
-
 def test_settings_reach_the_parts_of_an_analyzer():
     given = dict(setting(text) for text in ("graph.nodes=48,64", "shooting=none", "orbits=2", "source=clear"))
     made = configured(vk.LeastAction, given)

@@ -8,8 +8,10 @@ import pytest
 import vibrokit as vk
 from vibrokit.errors import FileError, SceneError
 from vibrokit.parts.single_parts import SINGLE_PARTS
+from vibrokit.registry import BUILT_IN, Group, load, names
 from vibrokit.results import atomic
 from vibrokit.scene_file import bundled_scenes, scene_data, scene_from_data
+from vibrokit.testing import KINDS
 
 
 def everything():
@@ -53,6 +55,33 @@ class TestRoundTrip:
         monkeypatch.chdir(tmp_path)
         vk.save_scene(everything(), "hertz-0.570")
         assert vk.load_scene("hertz-0.570") == everything()
+
+
+def built_in_parts():
+    """Every registered part of the toolkit, with the checks that put it into a scene."""
+    return [
+        pytest.param(checks, load(checks.group, name), id=f"{checks.group.noun}-{name}")
+        for checks in KINDS
+        for name, distribution in names(checks.group)
+        if distribution == BUILT_IN
+    ]
+
+
+class TestEveryBuiltInPart:
+    def test_every_kind_is_here(self):
+        no_parts = {Group.ANALYZERS, Group.EXITS, Group.RECORDS}
+        assert {checks.group for checks in KINDS} == set(Group) - no_parts
+
+    @pytest.mark.parametrize(("checks", "part"), built_in_parts())
+    def test_a_file_keeps_it(self, tmp_path, checks, part):
+        """With its default values where it has some, and with random ones."""
+        of_part = checks(part, rng=3)
+        for sample in of_part.samples:
+            osc = of_part.scene(sample)
+            vk.save_scene(osc, tmp_path / "scene.toml")
+            again = vk.load_scene(tmp_path / "scene.toml")
+            assert again == osc
+            assert again.parameters == osc.parameters
 
 
 class TestSaving:

@@ -153,7 +153,7 @@ COMMANDS = (
         "equations", "toolkit:equations", "print the derived equations",
         (_SCENE, _argument("--latex", action="store_true", help="as LaTeX")),
     ),
-    Command("list", "toolkit:list_names", "list scenes, parts, analyzers, exits and records"),
+    Command("list", "listing:list_names", "list scenes, parts with their parameters, analyzers, exits and records"),
     Command("check", "toolkit:check_part", "check a registered part against the conformance kit", (_argument("name"),)),
     Command(
         "plot", "saved:plot_file", "draw a saved result",

@@ -1,4 +1,4 @@
-"""vibrokit equations, list, check and trade: what the toolkit makes of a scene, a part, and this machine."""
+"""vibrokit equations, check and trade: what the toolkit makes of a scene, a part, and this machine."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from vibrokit.cli.long_work import check_targets, scene_stem, source_of
 from vibrokit.errors import VibrokitError
 from vibrokit.plots.trade import work_precision
 from vibrokit.progress import working
-from vibrokit.registry import Group, names
 from vibrokit.results.atomic import save_figure
-from vibrokit.scene_file import bundled_scenes, load_scene
+from vibrokit.scene_file import load_scene
 from vibrokit.testing import check
 from vibrokit.trade.assessments import measure_assessments
 from vibrokit.trade.basins import measure_basins
@@ -25,15 +24,6 @@ def equations(options: argparse.Namespace) -> None:
     """Print the derived equations of a scene."""
     model = load_scene(options.scene).model
     print(model.latex if options.latex else model)
-
-
-def list_names(options: argparse.Namespace) -> None:
-    """Print all that is registered, by name."""
-    print("scenes:", ", ".join(bundled_scenes()))
-    for group in Group:
-        print(f"{group.noun}s:")
-        for registered in names(group):
-            print(f"    {registered.name:<20} {registered.distribution}")
 
 
 def check_part(options: argparse.Namespace) -> int:

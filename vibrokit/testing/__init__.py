@@ -33,6 +33,7 @@ from vibrokit.testing.report import Check, ConformanceError, Outcome, Report, ra
 from vibrokit.testing.state_forces import FrictionChecks, SpringChecks
 
 __all__ = [
+    "KINDS",
     "Check",
     "ConformanceError",
     "Outcome",
@@ -50,13 +51,14 @@ __all__ = [
     "spring_checks",
 ]
 
-_KINDS: tuple[type[PartChecks[Any]], ...] = (
+KINDS: tuple[type[PartChecks[Any]], ...] = (
     ContactLawChecks,
     SpringChecks,
     FrictionChecks,
     ExcitationChecks,
     NoiseModelChecks,
 )
+"""The checks of each kind of part."""
 
 
 def check_contact_law(law: ContactLaw | type[ContactLaw], *, rng: Rng = 0) -> Report:
@@ -135,8 +137,8 @@ def check(name: str, *, rng: Rng = 0) -> Report:
     UnknownNameError
         No part has this name.
     """
-    known = {kind: {entry.name for entry in names(kind.group)} for kind in _KINDS}
-    reports = [_report(kind(load(kind.group, name, kind.kind), rng)) for kind in _KINDS if name in known[kind]]
+    known = {kind: {entry.name for entry in names(kind.group)} for kind in KINDS}
+    reports = [_report(kind(load(kind.group, name, kind.kind), rng)) for kind in KINDS if name in known[kind]]
     if not reports:
         raise UnknownNameError(f"There is no part {name!r} to check{nearest(name, set().union(*known.values()))}")
     return Report(tuple(outcome for report in reports for outcome in report.outcomes))

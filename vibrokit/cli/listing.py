@@ -1,0 +1,51 @@
+"""vibrokit list: all that is registered, by name, and the parameters of each part."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from vibrokit.parts.formula_part import FormulaPart
+from vibrokit.parts.parameter import Parameter
+from vibrokit.parts.part import Part
+from vibrokit.registry import Group, load_all, names
+from vibrokit.scene_file import bundled_scenes
+from vibrokit.testing import KINDS
+from vibrokit.text_table import text_table
+
+_PARTS = {checks.group: checks.kind for checks in KINDS}
+
+
+def list_names(options: argparse.Namespace) -> None:
+    """Print all that is registered; of a part also its parameters, as ``name symbol [unit]``."""
+    print("scenes:", ", ".join(bundled_scenes()))
+    rows = {group: tuple(_rows(group)) for group in Group}
+    lines = iter(text_table([row for of_group in rows.values() for row in of_group]))
+    for group, of_group in rows.items():
+        print(f"{group.noun}s:")
+        for _ in of_group:
+            print(f"    {next(lines)}")
+
+
+def _rows(group: Group) -> Iterator[tuple[str, str, str]]:
+    kind = _PARTS.get(group)
+    working = {} if kind is None else load_all(group, kind)
+    for name, distribution in names(group):
+        if kind is not None and name not in working:
+            yield name, distribution, "cannot be loaded"  # a warning gives the reason
+        else:
+            yield name, distribution, _parameters(working[name]) if kind is not None else ""
+
+
+def _parameters(cls: type[Part]) -> str:
+    of_formula = ("formula", "constants") if issubclass(cls, FormulaPart) else ()
+    shown = [_shown(declared) for declared in cls._declared if declared.attribute not in of_formula]
+    if issubclass(cls, FormulaPart):
+        shown.append(f"{cls.formula_name} in {' and '.join(cls.variables)} as text, and its constants")
+    return ", ".join(shown) or "none"
+
+
+def _shown(declared: Parameter) -> str:
+    if declared.unit is None:
+        return declared.name
+    return f"{declared.name} {declared.symbol} [{declared.unit or '1'}]"
