@@ -1,4 +1,7 @@
-"""Pulses and jumps of excitations are not stepped over: against SciPy, which starts anew at each of them."""
+"""Pulses, jumps and high frequencies of excitations are not stepped over.
+
+Against SciPy, which starts anew at each jump, and closed forms.
+"""
 
 import itertools
 import math
@@ -118,4 +121,14 @@ def test_times_of_changes():
     found = changes_of(beam(Blows(0.5, 0.01, PERIOD)))
     assert 0.01 / 1.5 < found.pulse < 0.01 * 1.5
     assert found.rise < 1e-3
-    assert changes_of(beam(vk.Harmonic(0.5, 200.0))) == (math.inf, math.inf)
+    assert changes_of(beam(vk.Harmonic(0.5, 200.0))) == (math.inf, math.inf, pytest.approx(2 * math.pi / 200.0))
+
+
+def test_frequencies_far_above_that_of_the_mass_are_resolved():
+    """Two tones with 913 oscillations in a section of ten free ones: the response is a sum of two sinusoids."""
+    tones = (65.0, 91.3)
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.5, excitations=[vk.Harmonic(100.0, w) for w in tones])
+    responses = np.array([100.0 / (1 - w**2 + 1j * w) for w in tones])
+    expected = [responses.sum().real, (1j * responses * tones).sum().real]
+    assert osc.period == pytest.approx(20 * math.pi, rel=1e-12)
+    np.testing.assert_allclose(osc.section_map([[0.0, 0.0]], 2)[0], expected, atol=1e-5)

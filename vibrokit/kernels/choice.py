@@ -15,7 +15,6 @@ from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.located import FreeFlight, Order8
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.time_scales import changes_of, contact_times
-from vibrokit.parts.excitation import Constant, Harmonic
 from vibrokit.parts.noise import WhiteNoise
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import LinearSpring
@@ -25,7 +24,7 @@ _STEPS, _FEWEST_STEPS = 256, 32  # in an interval of a quarter of a free oscilla
 _MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
-_PER_PULSE, _PER_RISE = 16, 4  # steps in a pulse of an excitation, and where it crosses its range
+_PER_PULSE, _PER_RISE, _PER_WAVE = 16, 4, 16  # steps in a pulse of an excitation, where it crosses its range, in a wave
 _TOLERANCE = 1e-10
 LOCATED = Order8(1e-6)
 """For ensembles, wherever fixed steps would be too many."""
@@ -77,7 +76,8 @@ def warn_of_coarse_steps(scene: Scene, flow: Flow, stepper: Stepper) -> None:
     if taken < _TOO_FEW:
         problem = f"takes about {taken:.2g} steps in a contact with a stop, too few to follow it"
     elif stepper.steps < needed / 2:
-        problem = "takes steps that are too long for the shortest pulse or the steepest rise of an excitation"
+        problem = "takes steps that are too long for the shortest pulse, the steepest rise or the highest frequency"
+        problem += " of an excitation"
     else:
         return
     steps = _power_of_two(_steps_needed(scene, flow))
@@ -104,7 +104,7 @@ def _steps_of_changes(scene: Scene, flow: Flow) -> float:
     """Steps that resolve the excitations; with noise, which no step resolves either, those that see each pulse."""
     changes = changes_of(scene)
     rises = 0.0 if flow is Flow.NOISY else _PER_RISE / changes.rise
-    return scene.time_unit * max(_PER_PULSE / changes.pulse, rises)
+    return scene.time_unit * max(_PER_PULSE / changes.pulse, rises, _PER_WAVE / changes.wave)
 
 
 def _turns(scene: Scene) -> float:
@@ -134,7 +134,7 @@ def _power_of_two(needed: float) -> int:
 def _flies(scene: Scene, flow: Flow) -> bool:
     """Whether all parts are built-in ones that FreeFlight accepts; decided without their formulas, for speed."""
     linear = scene.friction is None and (scene.spring is None or type(scene.spring) is LinearSpring)
-    sinusoids = all(type(part) in (Harmonic, Constant) for part in scene.excitations)
+    sinusoids = all(part.frequencies is not None for part in scene.excitations)
     if scene.noise is None or type(scene.noise) is WhiteNoise:
         return linear and sinusoids
     with_noise = flow.has_momenta or flow.has_covariance  # the amplitude is among what is integrated

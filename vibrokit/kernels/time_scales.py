@@ -19,7 +19,7 @@ from scipy.ndimage import grey_closing, grey_opening
 from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.vector_field import VectorField
-from vibrokit.parts.excitation import Constant, Excitation, Harmonic
+from vibrokit.parts.excitation import Constant, Excitation
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
@@ -34,18 +34,18 @@ Array = NDArray[np.float64]
 
 
 class Changes(NamedTuple):
-    """The shortest times (s) in which excitations change; infinite for sinusoids, which every stepper resolves."""
+    """The shortest times (s) in which excitations change; infinite where there is no such change."""
 
     pulse: float  # for which the force is larger, or smaller, than before and after
     rise: float  # in which the force would cross its range at its greatest slope
+    wave: float = math.inf  # period of the highest frequency of sinusoids, which need no search for pulses
 
 
 def changes_of(scene: Scene) -> Changes:
     """Return the shortest times in which the excitations of a scene change."""
-    own = [part for part in scene.excitations if not isinstance(part, Constant | Harmonic)]
     turns = _TURNS * 2 * math.pi / scene.natural_frequency
-    found = [_changes(part, turns if math.isinf(part.period or math.inf) else math.inf) for part in own]
-    return Changes(*(min(times) for times in zip(*found, strict=True))) if found else Changes(math.inf, math.inf)
+    found = [_changes(part, turns if math.isinf(part.period or math.inf) else math.inf) for part in scene.excitations]
+    return Changes(*map(min, zip(*found, strict=True))) if found else Changes(math.inf, math.inf)
 
 
 @functools.lru_cache(maxsize=64)
@@ -54,6 +54,8 @@ def _changes(part: Excitation, longest: float) -> Changes:
 
     Pulses lower than a hundredth of the range of the force are left out.
     """
+    if part.frequencies is not None:
+        return Changes(math.inf, math.inf, 2 * math.pi / max(part.frequencies) if part.frequencies else math.inf)
     repeats, window = math.isinf(longest), min(part.period or math.inf, longest)
     field = VectorField(Scene(natural_frequency=1.0, damping_ratio=0.0, excitations=(part,)))
     spacing = window / _SAMPLES

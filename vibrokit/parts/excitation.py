@@ -29,6 +29,11 @@ class Excitation(Part):
     def period(self) -> float | None:
         """Period (s); None if the force is constant, `math.inf` if it varies without period."""
 
+    @property
+    def frequencies(self) -> tuple[float, ...] | None:
+        """Angular frequencies (s⁻¹) of a force that is a sum of sinusoids and a constant; None for any other force."""
+        return None
+
 
 class Harmonic(Excitation):
     """Harmonic force: f cos(ω t + φ).
@@ -56,6 +61,11 @@ class Harmonic(Excitation):
         """Period 2π/ω (s)."""
         return 2 * math.pi / self.frequency
 
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """The frequency ω (s⁻¹) alone."""
+        return (self.frequency,)
+
 
 class Constant(Excitation):
     """Constant force f.
@@ -80,3 +90,8 @@ class Constant(Excitation):
     def period(self) -> None:
         """None: a constant force has no period."""
         return None
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """No frequency."""
+        return ()
