@@ -64,6 +64,11 @@ def test_numbers_of_the_scene(name, value):
         (lambda: vk.WhiteNoise(math.nan), f"WhiteNoise: intensity {LOW}, got nan."),
         (lambda: vk.Harmonic(0.1, 0.0), f"Harmonic: frequency {POSITIVE}, got 0."),
         (lambda: vk.Harmonic(math.inf, 1.0), "Harmonic: amplitude must be a finite number, got inf."),
+        (lambda: vk.SupportMotion(1e-3, -2.0), f"SupportMotion: frequency {POSITIVE}, got -2."),
+        (
+            lambda: vk.SupportAcceleration(math.nan, 1.0),
+            "SupportAcceleration: amplitude must be a finite number, got nan.",
+        ),
         (lambda: vk.CustomLaw("k*depth", k=math.nan), "CustomLaw: k must be a finite number, got nan."),
         (lambda: vk.CubicSpring(1.0, "b"), "CubicSpring: cubic must be a finite number, got 'b'."),
     ],

@@ -1,0 +1,77 @@
+"""Motion of the support: the inertial force that the mass feels in the coordinate relative to the support.
+
+Spring, damping and stops act between the mass and the support, so nothing else changes. The stops move with it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.functions import cos
+from vibrokit.parts.parameter import parameter
+
+
+class SupportMotion(Excitation):
+    """Support that moves as y = a cos(ω t + φ), stops with it: the force is −y″ = a ω² cos(ω t + φ).
+
+    Parameters
+    ----------
+    amplitude : float
+        a, in m.
+    frequency : float
+        ω, in rad s⁻¹, positive.
+    phase : float
+        φ, in rad.
+    """
+
+    amplitude: float = parameter("a", "m")
+    frequency: float = parameter("omega", "s^-1", above=0)
+    phase: float = parameter("phi", "rad", default=0.0)
+
+    def force(self, t: Any) -> Any:
+        """Force at time t: a ω² cos(ω t + φ)."""
+        return self.amplitude * self.frequency**2 * cos(self.frequency * t + self.phase)
+
+    @property
+    def period(self) -> float:
+        """Period 2π/ω (s)."""
+        return 2 * math.pi / self.frequency
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """The frequency ω (s⁻¹) alone."""
+        return (self.frequency,)
+
+
+class SupportAcceleration(Excitation):
+    """Support with the acceleration y″ = A cos(ω t + φ), stops with it: the force is −A cos(ω t + φ).
+
+    Parameters
+    ----------
+    amplitude : float
+        A, in m s⁻².
+    frequency : float
+        ω, in rad s⁻¹, positive.
+    phase : float
+        φ, in rad.
+    """
+
+    amplitude: float = parameter("A", "m s^-2")
+    frequency: float = parameter("omega", "s^-1", above=0)
+    phase: float = parameter("phi", "rad", default=0.0)
+
+    def force(self, t: Any) -> Any:
+        """Force at time t: −A cos(ω t + φ)."""
+        return -self.amplitude * cos(self.frequency * t + self.phase)
+
+    @property
+    def period(self) -> float:
+        """Period 2π/ω (s)."""
+        return 2 * math.pi / self.frequency
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """The frequency ω (s⁻¹) alone."""
+        return (self.frequency,)
