@@ -34,6 +34,7 @@ from .kernels.located import FreeFlight as FreeFlight
 from .kernels.located import Order8 as Order8
 from .oscillator import Oscillator as Oscillator
 from .parts.barrier import Barrier as Barrier
+from .parts.coloured_noise import ColouredNoise as ColouredNoise
 from .parts.contact import ContactLaw as ContactLaw
 from .parts.contact import CustomLaw as CustomLaw
 from .parts.contact import Hertz as Hertz
@@ -41,11 +42,13 @@ from .parts.contact import Linear as Linear
 from .parts.excitation import Constant as Constant
 from .parts.excitation import Excitation as Excitation
 from .parts.excitation import Harmonic as Harmonic
+from .parts.filtered_noise import FilteredNoise as FilteredNoise
 from .parts.friction import DryFriction as DryFriction
 from .parts.friction import Friction as Friction
 from .parts.friction import StribeckFriction as StribeckFriction
 from .parts.noise import NoiseModel as NoiseModel
 from .parts.noise import StateDependentNoise as StateDependentNoise
+from .parts.noise import StationaryNoise as StationaryNoise
 from .parts.noise import WhiteNoise as WhiteNoise
 from .parts.parameter import parameter as parameter
 from .parts.spring import CubicSpring as CubicSpring

@@ -60,7 +60,8 @@ class TestAbstractOrFinal:
         with pytest.raises(TypeError) as refused:
             type("Mine", (finished,), {})
         said = str(refused.value)
-        kind = next(base for base in (vk.ContactLaw, vk.Spring, vk.Excitation, vk.NoiseModel) if isinstance(part, base))
+        kinds = (vk.ContactLaw, vk.Spring, vk.Excitation, vk.StationaryNoise, vk.NoiseModel)
+        kind = next(base for base in kinds if isinstance(part, base))
         assert said.startswith(f"Mine inherits from {finished.__name__}, ")
         assert f"inherit from {kind.__name__} " in said
 

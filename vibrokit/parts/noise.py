@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
+from vibrokit.construction import called
 from vibrokit.parts.formula_part import FormulaPart
 from vibrokit.parts.parameter import parameter
 from vibrokit.parts.part import Part
+from vibrokit.parts.spectral_density import Measured, intensity_of
 
 
 class NoiseModel(Part):
@@ -48,7 +50,18 @@ class NoiseModel(Part):
         return ()
 
 
-class WhiteNoise(NoiseModel):
+class StationaryNoise(NoiseModel):
+    """Noise whose force has a power spectral density, the same wherever the mass is. Abstract."""
+
+    @abstractmethod
+    def density(self, frequency: Any) -> Any:
+        """One-sided power spectral density of the force per unit mass, in (m/s²)²/Hz, at an angular frequency (s⁻¹).
+
+        By arithmetic alone, so that it may be asked for an array of frequencies.
+        """
+
+
+class WhiteNoise(StationaryNoise):
     """Gaussian white noise ξ on the velocity, ⟨ξ(t) ξ(t+τ)⟩ = D δ(τ).
 
     Parameters
@@ -60,6 +73,42 @@ class WhiteNoise(NoiseModel):
     def amplitude(self, x: Any, v: Any) -> Any:
         """Factor before √D dW: 1 everywhere."""
         return 1
+
+    @classmethod
+    @called
+    def from_psd(cls, level: float, of: Measured | str = Measured.ACCELERATION, *, mass: float | None = None) -> Self:
+        """Return the noise of a one-sided power spectral density S, as analyzers of spectra show it.
+
+        Parameters
+        ----------
+        level : float
+            S at the frequencies of the motion: in (m/s²)²/Hz, or in N²/Hz of a force; not negative.
+        of : {"acceleration", "force", "base acceleration"}
+            What S was measured of: the random force per unit mass, the force, or the support.
+        mass : float, optional
+            The mass (kg) that a force acts on.
+
+        Raises
+        ------
+        ParameterError
+
+        Examples
+        --------
+        >>> WhiteNoise.from_psd(0.5)
+        WhiteNoise(intensity=0.25)
+        >>> WhiteNoise.from_psd(0.5, of="force", mass=0.5)
+        WhiteNoise(intensity=1.0)
+        """
+        return cls(intensity_of(f"{cls.__name__}.from_psd", level, of, mass))
+
+    @property
+    def psd(self) -> float:
+        """One-sided power spectral density 2D of the force per unit mass, in (m/s²)²/Hz."""
+        return 2 * self.intensity
+
+    def density(self, frequency: Any) -> Any:
+        """One-sided density 2D, the same at all frequencies."""
+        return self.psd + 0 * frequency
 
 
 class StateDependentNoise(FormulaPart, NoiseModel):
