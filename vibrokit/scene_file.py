@@ -17,6 +17,7 @@ from vibrokit.oscillator import Oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.own_numbers import NUMBERS
 from vibrokit.parts.part import Part
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.single_parts import SINGLE_PARTS
@@ -27,7 +28,8 @@ _BUNDLED = Path(__file__).parent / "scenes"
 _LARGEST_FILE = 100_000
 _MOST_PARTS = 100
 _LONGEST_NAME = 100
-_KEYS = ("natural_frequency", "damping_ratio", "spring", "friction", "barriers", "excitations", "noise")
+_NUMBERS = tuple(declared.name for declared in NUMBERS)
+_KEYS = (*_NUMBERS, "spring", "friction", "barriers", "excitations", "noise")
 _GROUPS = {"spring": Group.SPRINGS, "friction": Group.FRICTIONS, "noise": Group.NOISE_MODELS}  # of `SINGLE_PARTS`
 _BARRIER_KEYS = ("law", "position", "side", "adhesive")
 
@@ -142,7 +144,7 @@ def scene_text(scene: Scene) -> str:
 
 def scene_data(scene: Scene) -> dict[str, Any]:
     """Return a scene as the plain data of a scene file. A class that is not registered is named module:Class."""
-    data: dict[str, Any] = {"natural_frequency": scene.natural_frequency, "damping_ratio": scene.damping_ratio}
+    data: dict[str, Any] = {entry.path: entry.value for entry in scene.given_numbers}
     data |= {name: _part_data(_GROUPS[name], part) for name, part in scene.single_parts.items()}
     if scene.barriers:
         data["barriers"] = [_barrier_data(barrier) for barrier in scene.barriers]
@@ -168,11 +170,10 @@ def _named_parts(data: Mapping[str, Any]) -> list[tuple[Group, dict[str, Any]]]:
 
 def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
     """Return a checked oscillator from plain data."""
-    _check_keys("scene", data, _KEYS, required=_KEYS[:2])
+    _check_keys("scene", data, _KEYS, required=())
     given = {name: data[name] for name in _GROUPS if data.get(name) is not None}
     return Oscillator(
-        natural_frequency=data["natural_frequency"],
-        damping_ratio=data["damping_ratio"],
+        **{name: data[name] for name in _NUMBERS if name in data},
         barriers=tuple(_barrier(f"barriers.{i}", b) for i, b in enumerate(_listed("barriers", data))),
         excitations=tuple(
             _part(f"excitations.{i}", Group.EXCITATIONS, Excitation, e)

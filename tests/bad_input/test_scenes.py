@@ -40,19 +40,76 @@ NO_NUMBERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: f"{type(value).__name__}")
-@pytest.mark.parametrize("name", ["natural_frequency", "damping_ratio"])
+@pytest.mark.parametrize(
+    "value", [value for value in NO_NUMBERS if value is not None], ids=lambda value: f"{type(value).__name__}"
+)
+@pytest.mark.parametrize("name", ["natural_frequency", "damping_ratio", "stiffness", "damping"])
 def test_numbers_of_the_scene(name, value):
     said = refused(ParameterError, lambda: scene(**{name: value}))
-    assert said.startswith(f"scene: {name} {POSITIVE if name == 'natural_frequency' else LOW}, got ")
+    assert said.startswith(f"scene: {name} {LOW}, got ")
+
+
+RELATIVE = "but that is relative to a natural frequency, and the scene has none; give damping (s^-1) in its place."
+CUBIC = vk.CubicSpring(linear=1.0, cubic=2.0)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "kind", "said"),
+    [
+        (
+            {"damping": 0.1},
+            SceneError,
+            "it has neither natural_frequency nor stiffness nor a spring; give one of them, or natural_frequency = 0 "
+            "for a mass without a spring.",
+        ),
+        (
+            {"natural_frequency": 1.0},
+            SceneError,
+            "it has neither damping_ratio nor damping; give one of them, 0 for no damping.",
+        ),
+        (
+            {"natural_frequency": 2.0, "stiffness": 4.0, "damping": 0.1},
+            SceneError,
+            "natural_frequency = 2 and stiffness = 4 are both given, and stiffness is the square of "
+            "natural_frequency; give one of them.",
+        ),
+        (
+            {"natural_frequency": 2.0, "damping_ratio": 0.0, "damping": 0.1},
+            SceneError,
+            "damping_ratio = 0 and damping = 0.1 are both given, and damping is 2 damping_ratio natural_frequency; "
+            "give one of them.",
+        ),
+        ({"natural_frequency": 0.0, "damping_ratio": 0.1}, ParameterError, f"damping_ratio is 0.1, {RELATIVE}"),
+        ({"stiffness": 0.0, "damping_ratio": 0.1}, ParameterError, f"damping_ratio is 0.1, {RELATIVE}"),
+        ({"spring": CUBIC, "damping_ratio": 0.1}, ParameterError, f"damping_ratio is 0.1, {RELATIVE}"),
+        (
+            {"spring": CUBIC, "stiffness": 4.0, "damping": 0.1},
+            SceneError,
+            "stiffness = 4 is given and a spring besides, CubicSpring, which takes the place of the linear one; give "
+            "one of them.",
+        ),
+    ],
+)
+def test_numbers_that_do_not_fit_together(numbers, kind, said):
+    assert refused(kind, lambda: vk.Oscillator(**numbers)) == f"scene: {said}"
+
+
+def test_a_name_that_may_be_of_the_scene_or_of_a_part():
+    osc = scene(barriers=(stop("right"),))
+    assert refused(ParameterError, lambda: osc.replace(stiffness=60.0)) == (
+        "scene: 'stiffness' may be that of the scene, in place of natural_frequency, or barriers.0.law.stiffness; give "
+        "the full path of the latter, or natural_frequency=None besides for the former."
+    )
+    assert osc.replace({"barriers.0.law.stiffness": 60.0}).parameters["barriers.0.law.stiffness"] == 60.0
+    assert osc.replace(stiffness=60.0, natural_frequency=None).stiffness == 60.0
 
 
 @pytest.mark.parametrize(
     ("make", "said"),
     [
         *(
-            (partial(scene, natural_frequency=bad), f"scene: natural_frequency {POSITIVE}, got {bad:g}.")
-            for bad in (0.0, -1.0, math.nan, math.inf)
+            (partial(scene, natural_frequency=bad), f"scene: natural_frequency {LOW}, got {bad:g}.")
+            for bad in (-1.0, math.nan, math.inf)
         ),
         *(
             (partial(scene, damping_ratio=bad), f"scene: damping_ratio {LOW}, got {bad:g}.")

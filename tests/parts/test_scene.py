@@ -294,3 +294,62 @@ def test_a_multi_harmonic_orbit_has_the_common_period():
     assert np.abs(osc.section_map(settled, stepper=vk.RK4()) - settled).max() < 1e-8
     half = osc.trajectory(settled[0], duration=math.pi, stepper=vk.RK4())
     assert abs(half.states[-1] - settled[0]).max() > 1e-3
+
+
+OWN = {
+    "frequency and ratio": {"natural_frequency": 2.0, "damping_ratio": 0.1},
+    "stiffness and ratio": {"stiffness": 4.0, "damping_ratio": 0.1},
+    "frequency and damping": {"natural_frequency": 2.0, "damping": 0.4},
+    "stiffness and damping": {"stiffness": 4.0, "damping": 0.4},
+}
+
+
+class TestOwnNumbers:
+    @pytest.mark.parametrize("given", OWN.values(), ids=OWN)
+    def test_what_is_given_is_kept(self, given, tmp_path):
+        osc = vk.Oscillator(**given)
+        assert osc.parameters == given
+        assert (osc.own_frequency, osc.linear_damping, osc.reference_frequency) == (2.0, 0.4, 2.0)
+        vk.save_scene(osc, tmp_path / "scene.toml")
+        assert (tmp_path / "scene.toml").read_text() == "".join(f"{name} = {value}\n" for name, value in given.items())
+        assert vk.load_scene(tmp_path / "scene.toml") == osc
+        assert pickle.loads(pickle.dumps(osc)) == osc
+
+    @pytest.mark.parametrize("given", OWN.values(), ids=OWN)
+    def test_all_are_the_same_motion(self, given):
+        """x″ + 0.4 x′ + 4 x = 0 from x = 1: exp(−0.2 t) (cos ω t + 0.2/ω sin ω t), ω² = 4 − 0.04."""
+        rate = math.sqrt(3.96)
+        x = math.exp(-0.2) * (math.cos(rate) + 0.2 / rate * math.sin(rate))
+        assert vk.Oscillator(**given).trajectory((1.0, 0.0), duration=1.0).x[-1] == pytest.approx(x, rel=1e-12)
+
+    def test_the_other_of_a_pair_is_switched(self):
+        osc = scene()
+        assert osc.replace(stiffness=9.0).parameters == {"stiffness": 9.0, "damping_ratio": 0.01}
+        assert osc.replace({"damping": 0.3}).parameters == {"natural_frequency": 2.0, "damping": 0.3}
+        assert osc.replace(damping=0.3, natural_frequency=0).parameters == {"natural_frequency": 0.0, "damping": 0.3}
+        assert osc.replace(stiffness=9.0).replace(natural_frequency=2.0) == osc
+        assert osc.replace(damping=0.3).replace(damping_ratio=0.01) == osc
+
+    def test_a_spring_needs_no_frequency(self):
+        osc = vk.Oscillator(spring=vk.CubicSpring(linear=9.0, cubic=1.0), damping=0.3)
+        assert osc.parameters == {"damping": 0.3, "spring.linear": 9.0, "spring.cubic": 1.0}
+        assert osc.own_frequency == 0.0
+        assert vk.Oscillator(spring=osc.spring, damping_ratio=0).linear_damping == 0.0
+
+    @pytest.mark.parametrize(
+        ("parts", "frequency"),
+        [
+            ({"spring": vk.CubicSpring(linear=-9.0, cubic=1.0), "excitations": [harmonic(5.0)]}, 3.0),
+            ({"spring": vk.CustomSpring("a*sin(2*x)", a=8.0)}, 4.0),
+            ({"spring": vk.CustomSpring("1/x")}, 0.25),
+            ({"spring": vk.CubicSpring(linear=0.0, cubic=1.0)}, 0.25),
+            ({"natural_frequency": 0, "excitations": [harmonic(2.0), harmonic(5.0), vk.Constant(1.0)]}, 5.0),
+            ({"natural_frequency": 0, "excitations": [vk.Constant(1.0)]}, 0.25),
+            ({"natural_frequency": 0, "damping": 0.0}, 1.0),
+            ({"natural_frequency": 2.0, "excitations": [harmonic(5.0)]}, 2.0),
+        ],
+    )
+    def test_reference_frequency(self, parts, frequency):
+        osc = vk.Oscillator(**({"damping": 0.25} | parts))
+        assert osc.reference_frequency == pytest.approx(frequency, rel=1e-12)
+        assert osc.time_unit == osc.section_interval

@@ -112,7 +112,7 @@ def plausibility(osc: Oscillator) -> Plausibility:
     if response is not None:
         for index, barrier in enumerate(osc.barriers):
             found += _stop(osc, response, index, barrier)
-    if osc.damping_ratio >= _HEAVY:
+    if osc.damping_ratio is not None and osc.damping_ratio >= _HEAVY:
         found.append(Oddity(OddityCode.HEAVY_DAMPING, {"ratio": osc.damping_ratio}))
     return Plausibility(
         tuple(one for one in found if isinstance(one, Row) and math.isfinite(one.value)),
@@ -214,7 +214,7 @@ def contact_time(osc: Oscillator, index: int, speed: float) -> float:
     back.
     """
     force = contact_force_of(osc.model, index)
-    length = speed / osc.natural_frequency  # the depths are searched over twenty decades about it
+    length = speed / osc.reference_frequency  # the depths are searched over twenty decades about it
     nodes, weights = np.polynomial.legendre.leggauss(40)
 
     def work(low: float, high: float) -> float:

@@ -109,7 +109,7 @@ def _steps_of_changes(scene: Scene, flow: Flow) -> float:
 
 def _turns(scene: Scene) -> float:
     """Free oscillations in the interval that steps are counted in."""
-    return scene.time_unit * scene.natural_frequency / (2 * math.pi)
+    return scene.time_unit * scene.reference_frequency / (2 * math.pi)
 
 
 def _steps_per_contact(exponent: float) -> int:

@@ -60,7 +60,7 @@ def fastest_force(scene: Scene, state: Array) -> FastForce | None:
     is not in contact.
     """
     x, v = float(state[0]), float(state[1])
-    speed = max(abs(v), scene.natural_frequency * abs(x), np.finfo(float).tiny)
+    speed = max(abs(v), scene.reference_frequency * abs(x), np.finfo(float).tiny)
     found = [_in_velocity(name, part, x, v, speed) for name, part in scene.forces_of_state.items()]
     found += [_stop(scene, number, x, v, speed) for number in range(len(scene.barriers))]
     return min((force for force in found if force.time < math.inf), key=lambda force: force.time, default=None)
@@ -75,7 +75,7 @@ def _in_velocity(name: str, part: Spring | Friction, x: float, v: float, speed: 
 def _stop(scene: Scene, number: int, x: float, v: float, speed: float) -> FastForce:
     barrier = scene.barriers[number]
     law, place, rate = barrier.law, barrier.position, barrier.sign * v
-    depth = max(barrier.sign * (x - place), 1e-9 * max(abs(place), abs(x), speed / scene.natural_frequency))
+    depth = max(barrier.sign * (x - place), 1e-9 * max(abs(place), abs(x), speed / scene.reference_frequency))
     rigidity = _slope(lambda deep: law.force(deep, rate), depth, 0.5 * depth)
     damping = _slope(lambda fast: law.force(depth, fast), rate, speed)
     words = (

@@ -25,7 +25,7 @@ _EMITTERS = ("parts", "symbolic", "kernels")
 
 def scene_fingerprint(scene: Scene) -> str:
     """Return text that is equal for two scenes exactly if the same generated code serves both."""
-    rows = [environment(), *(entry.path for entry in scene.entries)]
+    rows = [environment(), *(entry.path for entry in scene.entries), f"{scene.own_frequency > 0}"]
     rows += [f"{path} {_part(path, part, scene)}" for path, part in scene.placed_parts() if isinstance(part, Part)]
     rows += [f"{barrier.side} {barrier.adhesive} {_limits(barrier.law)}" for barrier in scene.barriers]
     rows += [] if scene.noise is None else [f"{scene.noise.extra_states}"]

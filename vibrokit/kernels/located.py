@@ -59,7 +59,7 @@ class LocatedStepper(Stepper):
         """
         cycle, longest = 0 if samples else scene.intervals_in_period(interval), _IN_PULSE * changes_of(scene).pulse
         lapse = interval * samples
-        return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.natural_frequency, lapse, longest
+        return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.reference_frequency, lapse, longest
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and the slopes of all lanes.

@@ -43,7 +43,7 @@ class Changes(NamedTuple):
 
 def changes_of(scene: Scene) -> Changes:
     """Return the shortest times in which the excitations of a scene change."""
-    turns = _TURNS * 2 * math.pi / scene.natural_frequency
+    turns = _TURNS * 2 * math.pi / scene.reference_frequency
     found = [_changes(part, turns if math.isinf(part.period or math.inf) else math.inf) for part in scene.excitations]
     return Changes(*map(min, zip(*found, strict=True))) if found else Changes(math.inf, math.inf)
 
@@ -134,11 +134,12 @@ def _force(law: Callable[..., float], stop: int, depth: float, rate: float, thet
 
 def _typical_motion(scene: Scene, module: types.ModuleType, theta: list[float]) -> tuple[float, float]:
     """Largest displacement and speed: of the linear response to the forcing, or those needed to reach a stop."""
-    own = scene.natural_frequency
-    stiffness = scene.spring.stiffness if isinstance(scene.spring, LinearSpring) else own**2
+    own = scene.reference_frequency
+    stiffness = scene.own_frequency**2 if scene.spring is None else own**2
+    stiffness = scene.spring.stiffness if isinstance(scene.spring, LinearSpring) else stiffness
     rates, sizes = _harmonics(scene, module, theta)
     with np.errstate(divide="ignore", invalid="ignore"):
-        response = np.abs(sizes / (stiffness - rates**2 + 2j * scene.damping_ratio * own * rates))
+        response = np.abs(sizes / (stiffness - rates**2 + 1j * scene.linear_damping * rates))
     response[sizes == 0.0] = 0.0
     constant = sum(part.magnitude for part in scene.excitations if isinstance(part, Constant))
     moving = rates > 0.0  # a constant part may displace a mass without a spring by any length

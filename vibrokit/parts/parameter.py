@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from vibrokit.arguments import real
 from vibrokit.construction import called
@@ -69,6 +69,14 @@ class Parameter:
             given = "one above 1.8e308" if large else shown(value) if math.isnan(number) else f"{number:g}"
             raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {given}.")
         return number
+
+
+class Entry(NamedTuple):
+    """One parameter of a scene: its path, its declaration and its value."""
+
+    path: str
+    declared: Parameter
+    value: Any
 
 
 @called

@@ -7,45 +7,39 @@ import functools
 import math
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 from vibrokit.arguments import members, real
-from vibrokit.construction import Constructed, called
+from vibrokit.construction import called
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
 from vibrokit.parts.excitation import Excitation
 from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
-from vibrokit.parts.parameter import Parameter
+from vibrokit.parts.own_numbers import OwnNumbers, displaced, refuse_two_meanings
+from vibrokit.parts.parameter import Entry
 from vibrokit.parts.single_parts import FORCES_OF_STATE, SINGLE_PARTS
 from vibrokit.parts.spring import Spring
+from vibrokit.parts.time_scale import reference_frequency
 
-_OWN = (
-    Parameter("natural_frequency", "natural_frequency", "omega_n", "s^-1", above=0),
-    Parameter("damping_ratio", "damping_ratio", "zeta", "", minimum=0),
-)
 _MOST_INTERVALS = 4096  # in a period, over which the forcing is tabulated
 _LONGEST_RATIO = 1000  # largest whole number in a ratio of two frequencies with a common period
 
 
-class Entry(NamedTuple):
-    """One parameter of a scene: its path, its declaration and its value."""
-
-    path: str
-    declared: Parameter
-    value: Any
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Scene(metaclass=Constructed):
-    """The parts of one oscillator, x″ + 2ζω_n x′ + spring + friction = stops + Σ excitations + noise.
+class Scene(OwnNumbers):
+    """The parts of one oscillator, x″ + c x′ + spring + friction = stops + Σ excitations + noise, per unit mass.
 
     Parameters
     ----------
-    natural_frequency : float
-        ω_n (s⁻¹), positive. Sets the spring ω_n² x if no spring is given, and with ζ the damping 2ζω_n.
-    damping_ratio : float
-        ζ, not negative.
+    natural_frequency : float, optional
+        ω_n (s⁻¹), not negative. The spring is ω_n² x if no spring is given; with 0 there is none.
+    damping_ratio : float, optional
+        ζ, not negative: c = 2ζω_n. It has no meaning without ω_n. Give either this or `damping`.
+    stiffness : float, optional
+        κ (s⁻²) of the spring κ x, not negative, in place of ω_n = √κ.
+    damping : float, optional
+        c (s⁻¹), not negative.
     barriers : sequence of Barrier
         At most one per side; the left one is not to the right of the right one.
     excitations : sequence of Excitation
@@ -60,8 +54,6 @@ class Scene(metaclass=Constructed):
         A number is out of range, or parts do not fit together.
     """
 
-    natural_frequency: float
-    damping_ratio: float
     barriers: tuple[Barrier, ...] = ()
     excitations: tuple[Excitation, ...] = ()
     noise: NoiseModel | None = None
@@ -69,9 +61,7 @@ class Scene(metaclass=Constructed):
     friction: Friction | None = None
 
     def __post_init__(self) -> None:
-        for declared in _OWN:
-            value = declared.checked("scene", getattr(self, declared.name))
-            object.__setattr__(self, declared.name, value)
+        self._check_numbers(self.spring)
         object.__setattr__(self, "barriers", _checked_parts("barriers", self.barriers, Barrier))
         object.__setattr__(self, "excitations", _checked_parts("excitations", self.excitations, Excitation))
         for name, part in self.single_parts.items():
@@ -118,7 +108,7 @@ class Scene(metaclass=Constructed):
     @functools.cached_property
     def entries(self) -> tuple[Entry, ...]:
         """Every parameter with its path, in the order of the parameter array of compiled code."""
-        found = [Entry(declared.name, declared, getattr(self, declared.name)) for declared in _OWN]
+        found = self.given_numbers
         for prefix, part in self.placed_parts():
             values = part.parameters
             found += [Entry(f"{prefix}.{d.name}", d, values[d.name]) for d in part.declared()]
@@ -167,6 +157,8 @@ class Scene(metaclass=Constructed):
     def replace(self, changes: Mapping[str, Any] | None = None, /, **more: Any) -> Self:
         """Return a copy with some parameters or parts changed, checked like a new scene.
 
+        `stiffness` takes the place of `natural_frequency`, and `damping` that of `damping_ratio`, and the reverse.
+
         Parameters
         ----------
         changes : mapping of str to value, optional
@@ -189,7 +181,10 @@ class Scene(metaclass=Constructed):
         if not isinstance(changes, Mapping | None):
             raise ParameterError(f"scene: changes must be a mapping from paths to values, got {shown(changes)}.")
         given = [*(changes or {}).items(), *more.items()]
-        scene = dataclasses.replace(self, **{key: value for key, value in given if key in fields})
+        whole: dict[str, Any] = {key: value for key, value in given if key in fields}
+        refuse_two_meanings(self, whole, self.parameters)
+        taken: dict[str, Any] = dict.fromkeys(displaced(whole).values())
+        scene = dataclasses.replace(self, **taken, **whole)
         paths = [key if key in fields else scene.entry(key).path for key, _ in given]
         changed: dict[str, Any] = {}
         for path, (_, value) in zip(paths, given, strict=True):
@@ -233,10 +228,15 @@ class Scene(metaclass=Constructed):
         """True if no excitation depends on time."""
         return all(part.period is None for part in self.excitations)
 
+    @functools.cached_property
+    def reference_frequency(self) -> float:
+        """What makes times and speeds comparable (s⁻¹): ω_n, or without it a frequency that the parts have."""
+        return reference_frequency(self)
+
     @property
     def section_interval(self) -> float:
         """Time between sections (s): the common period, or 2π/ω_n for an autonomous scene."""
-        return self.period or 2 * math.pi / self.natural_frequency
+        return self.period or 2 * math.pi / self.reference_frequency
 
     @property
     def time_unit(self) -> float:
@@ -244,7 +244,7 @@ class Scene(metaclass=Constructed):
         try:
             return self.section_interval
         except NoSectionError:
-            return 2 * math.pi / self.natural_frequency
+            return 2 * math.pi / self.reference_frequency
 
     def intervals_in_period(self, interval: float) -> int:
         """Return after how many intervals (s) the excitations repeat, so that trajectories share the phase; 0 if never.

@@ -27,7 +27,7 @@ class Spring(Part):
 class LinearSpring(Spring):
     """Linear spring: κ x.
 
-    A scene without a spring has ω_n² x; use this one to set stiffness and damping independently.
+    A scene may give `stiffness` instead; use this one for a negative stiffness.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class SceneArtists(Artists):
     """The parts of a scene."""
 
     mass: Rectangle
-    spring: Line2D
+    spring: Line2D | None
     damper: tuple[Line2D, ...]
     stops: tuple[Rectangle, ...]
     texts: tuple[Text, ...]
@@ -51,7 +51,7 @@ def scene_drawing(
     Parameters
     ----------
     spring, damper : str
-        The text beside each.
+        The text beside each; with "" for the spring there is none.
     stops : sequence of (side, text)
         The side is ``"left"`` or ``"right"``.
     forces : sequence of str
@@ -63,9 +63,9 @@ def scene_drawing(
         figure.set_layout_engine("none")  # a layout would shrink the drawing, but no words, to make room for words
     ink = str(axes.xaxis.label.get_color())
     mass = _mass(axes, ink)
-    (zigzag,) = axes.plot(*_zigzag(), color=ink, lw=1.2)
+    zigzag = axes.plot(*_zigzag(), color=ink, lw=1.2)[0] if spring else None
     rods = tuple(line for xs, ys in _dash_pot() for line in axes.plot(xs, ys, color=ink, lw=1.2))
-    texts = [_text(axes, (_WALL, -0.2), _wrapped(f"{spring}\n{damper}"), "left", "top")]
+    texts = [_text(axes, (_WALL, -0.2), _wrapped(f"{spring}\n{damper}".strip()), "left", "top")]
     blocks = []
     for side, words in stops:
         blocks.append(_stop(axes, side, ink))

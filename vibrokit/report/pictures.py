@@ -39,13 +39,30 @@ def pictures_of(record: Record, name: str) -> list[Picture]:
 def scene_picture(osc: Oscillator) -> Picture:
     """Return the drawing of a scene with its values."""
     drawn = scene_drawing(
-        spring=_value_text("ω_n", osc.natural_frequency, "s^-1") if osc.spring is None else _part_text(osc.spring),
-        damper=f"ζ = {osc.damping_ratio:.6g}" + ("" if osc.friction is None else f"\n{_part_text(osc.friction)}"),
+        spring=_spring_text(osc),
+        damper=_damper_text(osc),
         stops=[(one.side, f"at {_value_text('x', one.position, 'm')}\n{_part_text(one.law)}") for one in osc.barriers],
         forces=[_part_text(part) for part in osc.excitations],
         noise="" if osc.noise is None else _part_text(osc.noise),
     )
     return Picture(inline_svg(drawn, "scene"), "The scene, not to scale.")
+
+
+def _spring_text(osc: Oscillator) -> str:
+    """The spring and its values; "" for a mass without one."""
+    if osc.spring is not None:
+        return _part_text(osc.spring)
+    if not osc.own_frequency:
+        return ""
+    if osc.stiffness is not None:
+        return _value_text("κ", osc.stiffness, "s^-2")
+    return _value_text("ω_n", osc.own_frequency, "s^-1")
+
+
+def _damper_text(osc: Oscillator) -> str:
+    given = osc.damping is not None
+    own = _value_text("c", osc.linear_damping, "s^-1") if given else f"ζ = {osc.damping_ratio:.6g}"
+    return own if osc.friction is None else f"{own}\n{_part_text(osc.friction)}"
 
 
 @singledispatch

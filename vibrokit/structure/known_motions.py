@@ -100,8 +100,8 @@ def balances_of(osc: Oscillator, length: float) -> tuple[Balance, ...]:
 
 def _balances_about(steady: SteadyForce, tone: Tone, rest: float) -> Iterator[Balance]:
     """The motions about one rest that one tone keeps up."""
-    natural = steady.osc.natural_frequency
-    deflection, damping = tone.force / natural**2, 2 * steady.osc.damping_ratio * natural * tone.frequency
+    deflection = tone.force / steady.osc.reference_frequency**2
+    damping = steady.osc.linear_damping * tone.frequency
     most = min(1e3 * deflection, tone.force / damping if damping else math.inf)
     if not most > 0:
         return

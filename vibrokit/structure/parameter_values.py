@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.arguments import members, real
 from vibrokit.errors import ParameterError, VibrokitError, shown
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.scene import Entry
+from vibrokit.parts.parameter import Entry
 
 
 @dataclasses.dataclass(frozen=True)

@@ -25,13 +25,13 @@ Array = NDArray[np.float64]
 
 def wait_of(osc: Oscillator) -> int:
     """Return the periods that a transient needs, by the damping."""
-    rate = osc.damping_ratio * osc.natural_frequency
+    rate = 0.5 * osc.linear_damping
     if rate == 0 and osc.model.undamped:
         raise StructureError(
-            "the scene has no damping (damping_ratio is 0, the stops are elastic), and undamped motion has no "
+            "the scene has no damping (that of the scene is 0, and the stops are elastic), and undamped motion has no "
             "attractors; give it damping."
         )
-    slowest = rate if osc.damping_ratio < 1 else osc.natural_frequency / (2 * osc.damping_ratio)
+    slowest = rate if rate < osc.reference_frequency else 0.5 * osc.reference_frequency**2 / rate
     return periods_of(osc, slowest) if slowest else 200
 
 

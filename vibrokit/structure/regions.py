@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 def search_region(osc: Oscillator) -> Region:
     """Return a region for starts: it contains the stops, and the reach of a linear oscillator under the same forces."""
     reach = length_of(osc)
-    speed = max(reach * osc.natural_frequency, _speed_of_turning(osc))
+    speed = max(reach * osc.reference_frequency, _speed_of_turning(osc))
     return _without_deep_contact(osc, between_borders(osc, Region((-reach, reach), (-speed, speed))))
 
 
@@ -38,13 +38,13 @@ def regions_over_tops(osc: Oscillator, searched: Region) -> list[Region]:
     low, high = over_tops(osc, (), *searched.x)
     if (low, high) == searched.x:
         return []
-    speed = max(osc.natural_frequency * max(-low, high), SteadyForce(osc).speed_to_reach(low, high))
+    speed = max(osc.reference_frequency * max(-low, high), SteadyForce(osc).speed_to_reach(low, high))
     return [_without_deep_contact(osc, between_borders(osc, Region((low, high), (-speed, speed))))]
 
 
 def _speed_of_turning(osc: Oscillator) -> float:
     """Largest of the mean speeds (m/s) that a steady force or one turn in each period of the forcing gives; or 0."""
-    turn, damping = turn_of(osc), 2 * osc.damping_ratio * osc.natural_frequency
+    turn, damping = turn_of(osc), osc.linear_damping
     if not turn:
         return 0.0
     places = np.stack([np.linspace(0.0, turn, 64, endpoint=False), np.zeros(64)], axis=1)
@@ -76,7 +76,7 @@ def frame_of(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     swing = float(np.abs(x - x.mean()).max())
     fastest = max(float(np.abs(attractor.orbit[:, 1]).max()) for attractor in attractors)
     crossing = SteadyForce(osc).speed_to_reach(low, high)
-    speed = _ROOM * max(osc.natural_frequency * max(swing, least), float(np.abs(v).max()), fastest, crossing)
+    speed = _ROOM * max(osc.reference_frequency * max(swing, least), float(np.abs(v).max()), fastest, crossing)
     region = Region((float(middle - half), float(middle + half)), (-speed, speed))
     region = between_borders(osc, region, x.tolist())
     return _without_deep_contact(osc, region, (float(x.min()), float(x.max())))
@@ -127,7 +127,7 @@ def _turn_around(osc: Oscillator, attractors: Sequence[Attractor]) -> Region:
     resting = [each for each in attractors if not each.turns] or attractors
     middle = 0.5 * turn * round(float(resting[0].points[:, 0].mean()) / (0.5 * turn))
     fastest = max(float(np.abs(each.orbit[:, 1]).max()) for each in attractors)
-    speed = _ROOM * max(fastest, osc.natural_frequency * 0.5 * turn)
+    speed = _ROOM * max(fastest, osc.reference_frequency * 0.5 * turn)
     return Region((middle - 0.5 * turn, middle + 0.5 * turn), (-speed, speed))
 
 

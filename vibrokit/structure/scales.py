@@ -40,8 +40,8 @@ def length_of(osc: Oscillator) -> float:
     field, push = VectorField(osc), 0.0
     for index, part in enumerate(osc.excitations):
         resonant = len(osc.barriers) < 2 and part.period is not None
-        largest = _largest_force(field, index, part.period, 2 * math.pi / osc.natural_frequency)
-        push += largest * (5.0 if resonant else 1.0) / osc.natural_frequency**2  # room for subharmonic motions
+        largest = _largest_force(field, index, part.period, 2 * math.pi / osc.reference_frequency)
+        push += largest * (5.0 if resonant else 1.0) / osc.reference_frequency**2  # room for subharmonic motions
     stops = (2 * abs(barrier.position) for barrier in osc.barriers)
     if osc.model.domain:
         return max([push, _length_between_borders(osc), *stops]) or 1.0
@@ -54,7 +54,7 @@ def length_of(osc: Oscillator) -> float:
 
 def turns_of(osc: Oscillator) -> float:
     """Return the number of free oscillations in a section interval."""
-    return osc.section_interval * osc.natural_frequency / (2 * math.pi)
+    return osc.section_interval * osc.reference_frequency / (2 * math.pi)
 
 
 def doublings_of(osc: Oscillator) -> int:
@@ -73,13 +73,13 @@ def units_of(osc: Oscillator) -> Array:
     """
     length = length_of(osc)
     units = np.full(states_at(osc, np.zeros((1, 2))).shape[1], size_of(osc))
-    units[:2] = length, length * osc.natural_frequency
+    units[:2] = length, length * osc.reference_frequency
     return units
 
 
 def size_of(osc: Oscillator) -> float:
     """Return the size of states (x, v) that goes with it, x and v taken together."""
-    return length_of(osc) * math.hypot(1.0, osc.natural_frequency)
+    return length_of(osc) * math.hypot(1.0, osc.reference_frequency)
 
 
 def _swing(balances: Iterable[Balance]) -> float:
@@ -98,7 +98,7 @@ def _self_sustained(osc: Oscillator, field: VectorField) -> float:
     "Asymptotic Methods in the Theory of Non-linear Oscillations", 1961, section 1).
     """
     phases = 2 * math.pi / 128 * np.arange(128)
-    shape = np.stack([np.cos(phases), -osc.natural_frequency * np.sin(phases)], axis=-1)
+    shape = np.stack([np.cos(phases), -osc.reference_frequency * np.sin(phases)], axis=-1)
 
     def gain(logarithm: float) -> float:
         motion = math.exp(logarithm) * shape

@@ -291,7 +291,7 @@ def _rounds(wait: int) -> Iterator[int]:
 
 def _measuring_time(osc: Oscillator) -> int:
     """Periods in which motion that settles, however slowly, shows it: three e-foldings of the damping."""
-    folds = osc.damping_ratio * osc.natural_frequency * osc.section_interval
+    folds = 0.5 * osc.linear_damping * osc.section_interval
     return 1000 if folds == 0 else min(20_000, max(1000, math.ceil(3 / folds)))
 
 

@@ -116,7 +116,7 @@ class _KickSearch:
     def __init__(self, osc: Oscillator, classifier: BasinClassifier, attractor: Attractor) -> None:
         self.osc, self.classifier, self.attractor = osc, classifier, attractor
         widths = classifier.region.widths
-        self.reach = math.hypot(osc.natural_frequency * widths[0], widths[1])
+        self.reach = math.hypot(osc.reference_frequency * widths[0], widths[1])
 
     def smallest(self, angles: Array, width: float, phases: int) -> Shock | None:
         """Try all times and angles first, then refine around the best; `width` is the angle between two."""
@@ -188,7 +188,7 @@ class _KickSearch:
         )  # fmt: skip
 
     def _offsets(self, angles: Array, sizes: Array) -> Array:
-        return np.stack([sizes * np.cos(angles) / self.osc.natural_frequency, sizes * np.sin(angles)], axis=1)
+        return np.stack([sizes * np.cos(angles) / self.osc.reference_frequency, sizes * np.sin(angles)], axis=1)
 
     def _limits(self, states: Array, lags: Array, angles: Array, sizes: Array) -> NDArray[np.int64]:
         """Return the labels that states lead to after kicks."""

@@ -69,15 +69,15 @@ class DerivedContact:
         return slope is not None and slope.has(sympy.oo, -sympy.oo, sympy.zoo)
 
 
-def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], natural_frequency: float) -> DerivedContact:
-    """Derive the formula and the properties of the law of a barrier in a scene of this natural frequency (s⁻¹).
+def derive_contact(barrier: Barrier, symbols: dict[str, sympy.Symbol], frequency: float) -> DerivedContact:
+    """Derive the formula and the properties of the law of a barrier in a scene of this reference frequency (s⁻¹).
 
     Signs of its parameters are known; a minimum or a maximum that they do not decide at touch is decided by values.
     Raises DerivationError if the force is unbounded at first touch, or jumps in the depth or the rate.
     """
     values = {symbol: exact(barrier.law.parameters[name]) for name, symbol in symbols.items()}
     law = derived_formula(barrier.law, "force", symbols, (DEPTH, RATE))
-    refuse_jumps(barrier.law, law, (DEPTH, RATE), symbols, natural_frequency)
+    refuse_jumps(barrier.law, law, (DEPTH, RATE), symbols, frequency)
     law = law.xreplace({symbol: sympy.Integer(0) for symbol in values if symbol.is_zero})
     jumps = _jumps(law, values)
     root = next((root for root in _ROOTS if _smooth_in(law, root)), None)

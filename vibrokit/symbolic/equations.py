@@ -57,7 +57,7 @@ class Equations:
     def contacts(self) -> tuple[DerivedContact, ...]:
         """Derived contact of each stop."""
         return tuple(
-            derive_contact(barrier, self._symbols_of(f"barriers.{index}.law"), self.scene.natural_frequency)
+            derive_contact(barrier, self._symbols_of(f"barriers.{index}.law"), self.scene.reference_frequency)
             for index, barrier in enumerate(self.scene.barriers)
         )
 
@@ -77,12 +77,30 @@ class Equations:
     @cached_property
     def smooth_force(self) -> sympy.Expr:
         """Acceleration without stops and without time-dependent excitations."""
-        x, v, *extra = self.state
-        omega, zeta = self.symbols["natural_frequency"], self.symbols["damping_ratio"]
-        spring = omega**2 * x if self.scene.spring is None else 0
+        extra = self.state[2:]
         constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
         push = self._noise_formula("force", tuple(extra)) if extra else 0
-        return -2 * zeta * omega * v - spring - sum(self._forces_of_state.values()) + constant + push
+        return -self._own_damping - self._own_spring - sum(self._forces_of_state.values()) + constant + push
+
+    @property
+    def _own_frequency(self) -> sympy.Expr:
+        """ω_n in the number that the scene gives; 0 where it has none."""
+        symbols, given = self.symbols, self.scene.own_frequency > 0
+        omega = symbols.get("natural_frequency") or sympy.sqrt(symbols.get("stiffness", 0))
+        return omega if given else sympy.Integer(0)
+
+    @property
+    def _own_spring(self) -> sympy.Expr:
+        """ω_n² x or κ x, unless a spring takes its place."""
+        stiffness = self.symbols.get("stiffness", self._own_frequency**2)
+        return stiffness * self.state[0] if self.scene.spring is None else sympy.Integer(0)
+
+    @property
+    def _own_damping(self) -> sympy.Expr:
+        """2ζω_n v or c v."""
+        if self.scene.damping is not None:
+            return self.symbols["damping"] * self.state[1]
+        return 2 * self.symbols["damping_ratio"] * self._own_frequency * self.state[1]
 
     @cached_property
     def _forces_of_state(self) -> dict[str, sympy.Expr]:
@@ -92,7 +110,7 @@ class Equations:
     def _force_of_state(self, path: str, part: Spring | Friction) -> sympy.Expr:
         symbols, (x, v) = self._symbols_of(path), self.state[:2]
         force = without_removable(derived_formula(part, "force", symbols, (x, v)), (x, v))
-        refuse_jumps(part, force, (v,), symbols, self.scene.natural_frequency)
+        refuse_jumps(part, force, (v,), symbols, self.scene.reference_frequency)
         return force
 
     @cached_property
@@ -163,7 +181,7 @@ class Equations:
         symbols = self._symbols_of("noise")
         rates = derived_rates(noise, "drift", symbols, self.state, len(extra))
         for rate in rates:
-            refuse_jumps(noise, rate, self.state, symbols, self.scene.natural_frequency)
+            refuse_jumps(noise, rate, self.state, symbols, self.scene.reference_frequency)
         return rates
 
     @cached_property
@@ -202,7 +220,7 @@ class Equations:
     def _noise_formula(self, method: str, state: tuple[sympy.Symbol, ...]) -> sympy.Expr:
         symbols = self._symbols_of("noise")
         formula = derived_formula(self.scene.noise, method, symbols, state)
-        refuse_jumps(self.scene.noise, formula, state, symbols, self.scene.natural_frequency)
+        refuse_jumps(self.scene.noise, formula, state, symbols, self.scene.reference_frequency)
         return formula
 
     @cached_property

@@ -27,7 +27,7 @@ def refuse_jumps(
     force: sympy.Expr,
     state: Sequence[sympy.Symbol],  # displacement and velocity, or depth and rate, then extra states
     values: Mapping[str, sympy.Expr],  # the symbol of each parameter of the part
-    natural_frequency: float,  # (s⁻¹), for the width of the smooth form that the error suggests
+    frequency: float,  # (s⁻¹), for the width of the smooth form that the error suggests
 ) -> None:
     """Raise DerivationError if a force, or a rate or an amplitude of the noise, jumps in a variable of the state.
 
@@ -39,11 +39,11 @@ def refuse_jumps(
     ones, so that f*sign(v) is refused at f = 0 too: the same compiled code serves other values of f.
     """
     for variable in sorted(state, key=lambda symbol: symbol.name not in _SPEEDS):  # friction is named first
-        _refuse(part, force, variable, values, natural_frequency)
+        _refuse(part, force, variable, values, frequency)
 
 
 def _refuse(
-    part: Any, force: sympy.Expr, speed: sympy.Symbol, values: Mapping[str, sympy.Expr], natural_frequency: float
+    part: Any, force: sympy.Expr, speed: sympy.Symbol, values: Mapping[str, sympy.Expr], frequency: float
 ) -> None:
     if not (switches := switches_of(force, speed)):
         return
@@ -54,7 +54,7 @@ def _refuse(
             if any(jump(point) > 0 for point in slice_.points(_DRAWS)):
                 steps = [jump(point) for point in slice_.points(3, own=True)]
                 plain = {symbol: sympy.Symbol(name) for symbol, name in slice_.names.items()}
-                raise _refusal(part, force.xreplace(plain), switch.xreplace(plain), speed, steps, natural_frequency)
+                raise _refusal(part, force.xreplace(plain), switch.xreplace(plain), speed, steps, frequency)
 
 
 def _jump(value: Function, argument: Function, point: list[mpmath.mpf], positive: bool | None) -> float:
@@ -83,11 +83,11 @@ def _refusal(
     switch: sympy.Expr,
     variable: sympy.Symbol,
     steps: list[float],
-    natural_frequency: float,
+    frequency: float,
 ) -> DerivationError:
     same = 0.0 < steps[0] < math.inf and math.isclose(min(steps), max(steps), rel_tol=1e-9)
     fast = variable.name in _SPEEDS and not isinstance(part, NoiseModel)
-    unit = steps[0] / (2 * natural_frequency ** (1 if fast else 2)) if same else 1.0
+    unit = steps[0] / (2 * frequency ** (1 if fast else 2)) if same else 1.0
     width = sympy.Symbol(f"{_WIDTH * unit:.1g}")
     size = f" by {steps[0]:.6g}" if same else ""
     smooth = _smooth(force, variable, width)

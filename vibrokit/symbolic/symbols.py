@@ -8,7 +8,8 @@ from typing import Any
 
 import sympy
 
-from vibrokit.parts.scene import Entry, Scene
+from vibrokit.parts.parameter import Entry
+from vibrokit.parts.scene import Scene
 
 _PREFIX = "u_"  # no name of generated code begins so
 # What equations show besides: a name like these gets an underscore, so that a reader can tell both apart.

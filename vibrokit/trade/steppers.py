@@ -178,7 +178,7 @@ def starts_between_stops(osc: Oscillator, count: int, rng: np.random.Generator) 
     left, right = places.get("left", -reach), places.get("right", reach)
     if left >= right and len(places) < 2:  # a single stop on the far side of 0
         left, right = (left, left + reach) if "left" in places else (right - reach, right)
-    speed = reach * osc.natural_frequency
+    speed = reach * osc.reference_frequency
     states = np.column_stack([rng.uniform(left, right, count), rng.uniform(-speed, speed, count)])
     return np.pad(states, ((0, 0), (0, len(osc.noise.extra_states) if osc.noise else 0)))
 

@@ -74,7 +74,7 @@ def _(end: InBasin, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
 @targets_at.register
 def _(end: AtFace, problem: ExitProblem, model: StepModel) -> list[ExitTarget]:
     # Noise moves v by Δv within a time τ at the cost Δv²/(2τ), and x by Δx at about that of Δv = ω_n Δx.
-    frequency = problem.scene.natural_frequency
+    frequency = problem.scene.reference_frequency
     distance = (end.level - float(problem.attractor.points[0, end.axis])) * (frequency if end.axis == 0 else 1.0)
     scale = 10 * distance**2 / (2 * max(1 / frequency, problem.scene.section_interval))
     return [FaceTarget(end.targets[:1], -1, scale, model, end.axis, end.level)]
@@ -100,7 +100,7 @@ def _straight(problem: ExitProblem, model: StepModel, states: Array) -> float:
     if np.isfinite(cost) and cost > 0:
         return cost
     # Pressed against a stiff stop, noise hardly moves the state: the scale of free motion.
-    frequency = model.scene.natural_frequency
+    frequency = model.scene.reference_frequency
     return float(frequency**3 * np.min(np.sum((miss * [1.0, 1 / frequency]) ** 2, axis=1)))
 
 

@@ -94,7 +94,7 @@ def lead_in(attractor: Attractor, propagator: SegmentPropagator, state: Array) -
     the attractor itself.
     """
     steps, interval = propagator.pieces, propagator.osc.section_interval
-    units = np.array([propagator.osc.natural_frequency, 1.0])
+    units = np.array([propagator.osc.reference_frequency, 1.0])
     intervals = min(250, max(1, math.ceil(_RELAXATIONS * _relaxation(attractor) / interval)))
     curve = attractor.orbit if attractor.kind == "limit cycle" else attractor.points
     place = int(np.argmin(np.linalg.norm((curve[:, :2] - state) * units, axis=1)))

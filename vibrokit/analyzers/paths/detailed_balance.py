@@ -140,7 +140,7 @@ def _highest(scene: Oscillator, places: list[float]) -> tuple[float, float, bool
         work, error = quad(
             force, one, other, epsabs=0.0, epsrel=1e-11, limit=200, points=kinks or None, full_output=True
         )[:2]  # it would warn where rounding limits the accuracy
-        rounding = 1e-15 * scene.natural_frequency**2 * max(abs(one), abs(other)) * abs(other - one)
+        rounding = 1e-15 * scene.reference_frequency**2 * max(abs(one), abs(other)) * abs(other - one)
         energy, total = energy - work, total + error + rounding
         if energy > highest[0]:
             highest = energy, total, other == places[-1]

@@ -150,4 +150,4 @@ def cycle_potential(osc: Oscillator, cycle: Attractor, stepper: Stepper) -> Cycl
     variances = [gathered / (1 - shrunk**2)]
     for factor, more in zip(factors[:-1], added[:-1], strict=True):
         variances.append(factor**2 * variances[-1] + more)
-    return CyclePotential(nodes[:-1], normals[:-1], np.array(variances), osc.natural_frequency)
+    return CyclePotential(nodes[:-1], normals[:-1], np.array(variances), osc.reference_frequency)

@@ -97,7 +97,7 @@ def _is_equilibrium(saddle: Saddle) -> bool:
 
 
 def _units(problem: ExitProblem) -> Array:
-    return np.array([1.0, problem.scene.natural_frequency])
+    return np.array([1.0, problem.scene.reference_frequency])
 
 
 def followed_within(problem: ExitProblem) -> Region:

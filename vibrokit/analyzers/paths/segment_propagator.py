@@ -46,7 +46,7 @@ class SegmentPropagator:
     def units(self) -> Array:
         """Sizes of the coordinates of a state that belong together: 1 m, ω_n m/s, and 1 for extra noise states."""
         units = np.ones(self.size)
-        units[1] = self.osc.natural_frequency
+        units[1] = self.osc.reference_frequency
         return units
 
     @property

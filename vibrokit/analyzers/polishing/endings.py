@@ -112,7 +112,7 @@ class FaceEnding(Ending):
     def _energy(self, scale: Array) -> float:
         """Size of H on a path of this size."""
         n = self.propagator.size
-        return self.propagator.osc.natural_frequency * float(scale[:n] @ scale[n:])
+        return self.propagator.osc.reference_frequency * float(scale[:n] @ scale[n:])
 
     def _gaps(self, states: Array) -> Array:
         """How far states are from the face, negative beyond it."""

@@ -276,4 +276,4 @@ def _relaxation(
 
 def _nearest(scene: Oscillator, points: Array, state: Array) -> int:
     """Which of some points is nearest to a state in (x, v)."""
-    return int(np.argmin(np.linalg.norm((points - state)[:, :2] / [1.0, scene.natural_frequency], axis=1)))
+    return int(np.argmin(np.linalg.norm((points - state)[:, :2] / [1.0, scene.reference_frequency], axis=1)))

@@ -15,7 +15,7 @@ from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import ParameterError, SceneError
 from vibrokit.oscillator import Oscillator
-from vibrokit.parts.scene import Entry
+from vibrokit.parts.parameter import Entry
 
 Array = NDArray[np.float64]
 

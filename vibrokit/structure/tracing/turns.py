@@ -66,7 +66,7 @@ def turns_at(member: Member, scene: Oscillator, surfaces: Sequence[Surface]) -> 
     if family.kind == "equilibrium":
         place = member.point[None]
         return {one: one.reach(scene, place, 0.0)[0] / family.sizes[0] for one in surfaces if not one.leaving}
-    unit = min(osc.section_interval, 2 * math.pi / osc.natural_frequency)
+    unit = min(osc.section_interval, 2 * math.pi / osc.reference_frequency)
     count = 256 * math.ceil(member.duration / unit - 1e-9)
     spacing = member.duration / count
     # A sample more, for a turn at the section itself.
