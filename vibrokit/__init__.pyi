@@ -35,6 +35,8 @@ from .kernels.located import Order8 as Order8
 from .oscillator import Oscillator as Oscillator
 from .parts.barrier import Barrier as Barrier
 from .parts.coloured_noise import ColouredNoise as ColouredNoise
+from .parts.common_period import Ratio as Ratio
+from .parts.common_period import common_ratios as common_ratios
 from .parts.contact import ContactLaw as ContactLaw
 from .parts.contact import CustomLaw as CustomLaw
 from .parts.contact import Hertz as Hertz

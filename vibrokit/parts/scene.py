@@ -6,13 +6,13 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from fractions import Fraction
 from typing import Any, Self
 
 from vibrokit.arguments import members, real
 from vibrokit.construction import called
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
+from vibrokit.parts.common_period import common_period
 from vibrokit.parts.excitation import Excitation
 from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
@@ -23,7 +23,6 @@ from vibrokit.parts.spring import Spring
 from vibrokit.parts.time_scale import reference_frequency
 
 _MOST_INTERVALS = 4096  # in a period, over which the forcing is tabulated
-_LONGEST_RATIO = 1000  # largest whole number in a ratio of two frequencies with a common period
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -205,23 +204,7 @@ class Scene(OwnNumbers):
             The periods have no common multiple.
         """
         periods = [part.period for part in self.excitations if part.period is not None]
-        if not periods:
-            return None
-        longest = max(periods)
-        if math.isinf(longest):
-            raise NoSectionError(
-                "scene: an excitation never repeats, so there is no section; give every excitation a finite period."
-            )
-        multiple = 1
-        for period in periods:
-            ratio = Fraction(longest / period).limit_denominator(_LONGEST_RATIO)
-            if ratio > _LONGEST_RATIO or not math.isclose(float(ratio), longest / period, rel_tol=1e-12):
-                raise NoSectionError(
-                    f"scene: excitations of periods {longest:.10g} and {period:.10g} have no common period, so there "
-                    f"is no section; give frequencies whose ratio is one of whole numbers up to {_LONGEST_RATIO}."
-                )
-            multiple = math.lcm(multiple, ratio.denominator)
-        return longest * multiple
+        return common_period(periods) if periods else None
 
     @property
     def autonomous(self) -> bool:
