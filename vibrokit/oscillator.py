@@ -41,7 +41,8 @@ Rng = int | np.random.Generator | None
 class Oscillator(Scene):
     """A vibro-impact oscillator: x″ + c x′ + spring + friction = stops + Σ excitations + noise, per unit mass.
 
-    Parameters as for `Scene`: c is `damping`, or 2ζω_n; the spring is κ x with `stiffness` κ, or ω_n² x. The equations are derived on first access, and code is compiled on first integration.
+    Parameters as for `Scene`: c is `damping`, or 2ζω_n; the spring is κ x with `stiffness` κ, or ω_n² x.
+    The equations are derived on first access, and code is compiled on first integration.
 
     Examples
     --------
