@@ -5,8 +5,8 @@ import dataclasses
 import pytest
 import sympy
 
-from tests.conformance import broken
-from vibrokit import Constant, CubicSpring, Hertz, WhiteNoise
+from tests.conformance import broken, broken_forcing
+from vibrokit import Constant, CubicSpring, DryFriction, Hertz, WhiteNoise
 from vibrokit.errors import UnknownNameError
 from vibrokit.kernels import kernel, store
 from vibrokit.symbolic import equations
@@ -26,7 +26,7 @@ KINDS = [
     (contact_law_checks, broken.LAWS),
     (spring_checks, broken.SPRINGS),
     (friction_checks, broken.FRICTIONS),
-    (excitation_checks, broken.EXCITATIONS),
+    (excitation_checks, [*broken.EXCITATIONS, *broken_forcing.EXCITATIONS]),
     (noise_model_checks, broken.NOISE_MODELS),
 ]
 CASES = [
@@ -100,8 +100,47 @@ def test_wrong_code_is_caught(checks, part, monkeypatch):
         dict(checks(part))["compiled"]()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("checks", "part"), [(contact_law_checks, Hertz), (spring_checks, CubicSpring), (friction_checks, DryFriction)]
+)
+def test_a_wrong_motion_is_caught(checks, part, monkeypatch):
+    """The motion is that of the formula, so that here another formula is the reference."""
+    expression = part_checks.PartChecks.expression
+    monkeypatch.setattr(part_checks.PartChecks, "expression", lambda *given: 1.001 * expression(*given))
+    with pytest.raises(ConformanceError, match="but its formula gives"):
+        dict(checks(part))["motion"]()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "column", "rates", "said"),
+    [
+        ("motion", (0, 0, 0, 1), (1, 1.001), "but its formula gives"),
+        ("compiled", (0, 0, 0, 1), (1, 1.001), "the rate of w "),
+        ("compiled", (0, 0, 1, 0), (1, 1), "the amplitude of NarrowBand"),
+        ("diffusion", (0, 1, 0, 0), (1, 1), "the square of its amplitude"),
+    ],
+)
+def test_wrong_extra_states_are_caught(name, column, rates, said, tmp_path, monkeypatch):
+    """The derivation is misled: the rates are other ones, or the noise drives another state."""
+    drift = equations.Equations._extra_drift.func
+    amplitude = equations.Equations.amplitude.func
+    wrong_drift = lambda of: tuple(r * rate for r, rate in zip(rates, drift(of), strict=True))  # noqa: E731
+    wrong_amplitude = lambda of: sympy.Matrix(column) * sum(amplitude(of))  # noqa: E731
+    monkeypatch.setattr(equations.Equations, "_extra_drift", property(wrong_drift))
+    monkeypatch.setattr(equations.Equations, "amplitude", property(wrong_amplitude))
+    monkeypatch.setattr(store, "cache_directory", lambda: tmp_path)
+    kernel._KERNELS.clear()
+    with pytest.raises(ConformanceError, match=said):
+        dict(noise_model_checks(broken_forcing.NarrowBand))[name]()
+    kernel._KERNELS.clear()
+
+
 def test_every_check_of_a_law_has_a_law_that_it_catches():
-    caught = {name for name, _ in broken.LAWS} | {name for name, *_ in broken.MISLED} | {"derivatives", "compiled"}
+    caught = (
+        {name for name, _ in broken.LAWS} | {name for name, *_ in broken.MISLED} | {"derivatives", "compiled", "motion"}
+    )
     assert {name for name, _ in contact_law_checks(Hertz)} == caught
 
 
@@ -109,12 +148,12 @@ def test_every_check_of_a_law_has_a_law_that_it_catches():
     ("checks", "good", "caught"),
     [
         (spring_checks, CubicSpring, broken.SPRINGS),
-        (excitation_checks, Constant, broken.EXCITATIONS),
+        (excitation_checks, Constant, [*broken.EXCITATIONS, *broken_forcing.EXCITATIONS]),
         (noise_model_checks, WhiteNoise, broken.NOISE_MODELS),
     ],
 )
 def test_every_check_of_another_kind_has_a_part_that_it_catches(checks, good, caught):
-    general = {name for name, _ in broken.LAWS} | {"derivatives", "compiled"}  # shared by all kinds, one code
+    general = {name for name, _ in broken.LAWS} | {"derivatives", "compiled", "motion"}  # shared by all kinds, one code
     assert {name for name, _ in checks(good)} <= {name for name, _ in caught} | general
 
 

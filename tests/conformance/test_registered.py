@@ -6,6 +6,7 @@ import math
 import pytest
 
 import vibrokit as vk
+from tests.conformance.broken_forcing import NarrowBand, SquareWave
 from tests.layers import long
 from tests.scenes import Coloured
 from vibrokit import testing
@@ -109,5 +110,10 @@ def test_excitation_that_never_repeats():
     testing.check_excitation(Pulse)
 
 
-def test_noise_with_a_state_of_its_own():
-    testing.check_noise_model(Coloured)
+def test_excitation_that_jumps():
+    testing.check_excitation(SquareWave)
+
+
+@pytest.mark.parametrize("noise", [Coloured, NarrowBand])
+def test_noise_with_states_of_its_own(noise):
+    testing.check_noise_model(noise)

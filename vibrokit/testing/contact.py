@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
@@ -18,6 +19,7 @@ from vibrokit.registry import Group
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
+from vibrokit.testing.motion import Motion, follow, numeric
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.precise import Function, derivative
 from vibrokit.testing.report import Check, ConformanceError
@@ -44,6 +46,7 @@ class ContactLawChecks(PartChecks[ContactLaw]):
             Check("leading power", self.leading_power),
             Check("smoothness at first touch", self.smoothness),
             Check("compiled", self.compiled),
+            Check("motion", self.motion),
         )
 
     def scene(self, part: ContactLaw) -> Oscillator:
@@ -183,6 +186,20 @@ class ContactLawChecks(PartChecks[ContactLaw]):
                 value = force((size * (k + 1)) ** root, mpmath.mpf(1) / 3, digits=digits)
                 total += (-1) ** (order - k) * mpmath.binomial(order, k) * value
             return total / size**order
+
+    def motion(self) -> str:
+        """A touch of the stop agrees with SciPy, which takes the law where the mass is past the stop and is pushed."""
+        return follow(map(self._motion, self.samples))
+
+    def _motion(self, part: ContactLaw) -> Motion:
+        law = numeric(self.expression(part), self.arguments, self.values(part))
+
+        def rates(t: float, state: Any) -> tuple[float, float]:
+            x, v = map(float, state)
+            push = max(law(x - 0.1, v), 0.0) if x > 0.1 else 0.0
+            return v, 0.2 * math.cos(0.9 * t) - 0.02 * v - x - push
+
+        return Motion(part, self.scene(part), (0.0, 0.5), 1.5, rates)
 
     # -- compiled code --------------------------------------------------------------------------------------------
 

@@ -15,8 +15,14 @@ from vibrokit.parts.spring import CubicSpring
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import Compiled
+from vibrokit.testing.forced import Forcing, motion_from_rest
+from vibrokit.testing.motion import SAME, compare
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.report import Check, ConformanceError
+
+_FRACTIONS = (2, 3, 5, 7)
+_LONG = 20 * math.pi  # a motion under a force that never repeats: ten free oscillations
+_SAME_OF_MANY = 1e-2  # of the size of the motion: fixed steps see a jump within one of them
 
 
 class ExcitationChecks(PartChecks[Excitation]):
@@ -33,32 +39,44 @@ class ExcitationChecks(PartChecks[Excitation]):
             Check("finite force", self.finite),
             Check("period", self.period),
             Check("compiled", self.compiled),
+            Check("motion", self.motion),
         )
 
     def scene(self, part: Excitation) -> Oscillator:
         return Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(part,))
 
     def period(self) -> str:
-        """The force repeats after a finite `period`; a `period` of None means a constant force."""
-        periods = []
+        """The force repeats after a finite `period`, and not before; a `period` of None means a constant force."""
+        periods, shorter = [], []
         for part in self.samples:
             period = self._declared_period(part)
             periods.append("constant" if period is None else f"{period:.6g} s")
             if period == math.inf:
                 continue
-            force = self.reference(part).exact
-            shift = math.pi if period is None else period
-            times = [mpmath.mpf(k) * shift / 37 for k in range(-37, 370, 11)]  # ten periods
-            size = max(abs(force(t)) for t in times)
-            for t in times:
-                change = abs(force(t + shift) - force(t))
-                if change > 1e-12 * size:
-                    raise ConformanceError(
-                        f"{part!r} has the period {period}, but its force changes by {mpmath.nstr(change, 6)} from t = "
-                        f"{mpmath.nstr(t, 6)} to {mpmath.nstr(t + shift, 6)}; return a period of the force, or None if "
-                        "it is constant."
-                    )
+            change = self._change(part, math.pi if period is None else period)
+            if change > 1e-12:
+                raise ConformanceError(
+                    f"{part!r} has the period {period}, but after it the force differs by {change:.6g} of its size; "
+                    "return a period of the force, or None if it is constant."
+                )
+            if period is not None and (forcing := self._forcing(part)).varies(period):
+                shorter.append({n for n in _FRACTIONS if forcing.repeats(period, period / n)})
+        if shorter and (fractions := set.intersection(*shorter)):
+            raise ConformanceError(
+                f"{self.samples[0]!r} has the period {periods[0]}, but its force repeats after 1/{max(fractions)} of "
+                "it; return the shortest period, in which the section map and the names of states count."
+            )
         return ", ".join(dict.fromkeys(periods))
+
+    def _forcing(self, part: Excitation) -> Forcing:
+        return Forcing(self.expression(part), self.arguments[0], self.values(part))
+
+    def _change(self, part: Excitation, shift: float) -> float:
+        """The largest change of the force after a shift in time, over its size, at times that seldom are of jumps."""
+        force = self.reference(part).exact
+        times = [(mpmath.mpf(k) + 1 / mpmath.pi) * shift / 37 for k in range(-37, 370, 11)]  # ten shifts
+        size = max(abs(force(t)) for t in times)
+        return float(max(abs(force(t + shift) - force(t)) for t in times) / size) if size else 0.0
 
     @staticmethod
     def _declared_period(part: Excitation) -> float | None:
@@ -72,6 +90,24 @@ class ExcitationChecks(PartChecks[Excitation]):
                 f"that never repeats, got {period!r}."
             )
         return period
+
+    def motion(self) -> str:
+        """From rest a linear oscillator moves as Duhamel's integral says, jumps and pulses included.
+
+        A single trajectory has to agree closely, and the section map, whose force is a table of times, more coarsely.
+        """
+        worst = 0.0
+        for part in self.samples:
+            period = self._declared_period(part) or 2 * math.pi
+            duration = period if math.isfinite(period) else _LONG
+            scene, ended = self.scene(part), motion_from_rest(self._forcing(part), 0.05, duration)
+            if ended[1] == 0.0:
+                continue
+            end = scene.trajectory((0.0, 0.0), duration=duration, samples=4).states[-1]
+            worst = max(worst, compare(part, duration, end, ended, SAME))
+            if math.isfinite(period):
+                compare(part, duration, scene.section_map([(0.0, 0.0)])[0], ended, _SAME_OF_MANY)
+        return f"within {worst:.1g} of Duhamel's integral"
 
     def compiled_distances(self, part: Excitation) -> Iterator[float]:
         scene = Oscillator(

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import mpmath
-import numpy as np
 import sympy
 
 from vibrokit.errors import VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.excitation import Harmonic
+from vibrokit.parts.formula_expression import exact
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.registry import Group
-from vibrokit.symbolic.flow import derive_flow
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.symbolic.formulas import derived_formula
-from vibrokit.symbolic.model import Model
 from vibrokit.symbolic.printer import printable
 from vibrokit.testing.compiled import Compiled
+from vibrokit.testing.motion import Motion, follow, numeric
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.precise import Reference, derivative
 from vibrokit.testing.report import Check, ConformanceError
@@ -42,6 +43,7 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
             Check("diffusion", self.diffusion),
             Check("derivatives", self.derivatives),
             Check("compiled", self.compiled),
+            Check("motion", self.motion),
         )
 
     def scene(self, part: NoiseModel) -> Oscillator:
@@ -83,28 +85,59 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
         return ", ".join(names) or "none"
 
     def diffusion(self) -> str:
-        """The diffusion matrix is real and has no negative eigenvalue."""
+        """The diffusion matrix has the square of the amplitude, real, for the driven state, and is 0 elsewhere."""
         for part in self.samples:
-            self.expression(part)
-            model = self.scene(part).model
+            driven = len(part.extra_states) + 1
+            squared = self.reference(part, self.expression(part) ** 2)
             values = self.values(part)
-            entries = sympy.lambdify([*self.arguments, *values], model.diffusion, modules="mpmath", dummify=True)
+            matrix = sympy.lambdify(
+                [*self.arguments, *values], self.scene(part).model.diffusion, modules="mpmath", dummify=True
+            )
             for point in self.points():
-                matrix = np.array(entries(*map(mpmath.mpf, (*point, *values.values()))).tolist(), dtype=complex)
-                lowest = np.linalg.eigvalsh(matrix).min()
-                if matrix.imag.any() or not lowest >= -1e-12 * abs(matrix).max():
+                found = matrix(*map(mpmath.mpf, (*point, *values.values())))
+                expected = mpmath.zeros(driven + 1)
+                expected[driven, driven] = square = squared.exact(*point)
+                if square < 0 or mpmath.mnorm(found - expected) > 1e-12 * square:
                     raise ConformanceError(
-                        f"The diffusion matrix of {part!r} must be real without negative eigenvalues, got "
-                        f"{matrix.tolist()} at {point}; give a real amplitude."
+                        f"The diffusion matrix of {part!r} is {found.tolist()} at {point}, and the square of its "
+                        f"amplitude {mpmath.nstr(square, 6)}; give a real amplitude, which drives the "
+                        "velocity, or the last of the extra states."
                     )
         return ""
+
+    def motion(self) -> str:
+        """Without noise, the extra states and the mass move as SciPy says."""
+        if not self.samples[0].extra_states:
+            return "no extra states"
+        return follow(map(self._motion, self.samples))
+
+    def _motion(self, part: NoiseModel) -> Motion:
+        states, values = self._states(part), self.values(part)
+        drift = [numeric(rate, states, values) for rate in self._drift(part)]
+
+        def rates(t: float, state: Any) -> tuple[float, ...]:
+            moving = [rate(*map(float, state)) for rate in drift]
+            return (moving[0], moving[1] + 0.2 * math.cos(0.9 * t), *moving[2:])
+
+        return Motion(part, self.scene(part), (0.3, 0.4, *(0.5 for _ in part.extra_states)), 1.0, rates)
+
+    def _states(self, part: NoiseModel) -> tuple[sympy.Symbol, ...]:
+        return (*self.arguments, *(sympy.Symbol(name, real=True) for name in part.extra_states))
+
+    def _drift(self, part: NoiseModel) -> tuple[sympy.Expr, ...]:
+        """Rates of the states without noise and forcing, written from the scene and the formulas of the part."""
+        x, v, *extra = self._states(part)
+        given: dict[str, Any] = {d.name: exact(part.parameters[d.name]) for d in part.declared()} | self.symbols(part)
+        twin = part.twin(given)
+        force = sympy.sympify(twin.force(*extra)) if extra else sympy.Integer(0)
+        return (v, -x - v / 10 + force, *map(sympy.sympify, twin.drift(x, v, *extra)))
 
     def compiled_distances(self, part: NoiseModel) -> Iterator[float]:
         yield from self._noisy_distances(part)
         yield from self._hamiltonian_distances(part)
 
     def _noisy_distances(self, part: NoiseModel) -> Iterator[float]:
-        """The noisy flow: √D times the amplitude, and its derivative in the driven state."""
+        """The noisy flow: √D times the amplitude, its derivative in the driven state, and every rate."""
         code = Compiled(self.scene(part), Flow.NOISY)
         size = sympy.sqrt(self.symbols(part)["intensity"]) * self.expression(part)
         pieces = [("amplitude", size)]
@@ -116,17 +149,28 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
             reference = self.reference(part, formula)
             for point in self.points():
                 yield reference.check(f"the {name} of {part!r}", point, code.call(name, *point))
+        yield from self._rate_distances(part, code, self._states(part), self._drift(part))
 
     def _hamiltonian_distances(self, part: NoiseModel) -> Iterator[float]:
-        """Every rate of the Hamiltonian flow and its variations, at random states."""
-        scene = Oscillator(natural_frequency=1.0, damping_ratio=0.05, noise=part)
-        flow = Flow.HAMILTONIAN_VARIATIONAL
-        code, model = Compiled(scene, flow), Model(scene)
-        equations = derive_flow(model, flow)
-        values = {symbol: scene.parameters[path] for path, symbol in model.symbols.items()}
-        references = [Reference(printable(rate), equations.variables, values) for rate in equations.rates]
+        """Every rate of H = p·b + ½ (amplitude p)² and of its variations, by SymPy from the formulas of the part."""
+        code = Compiled(dataclasses.replace(self.scene(part), excitations=()), Flow.HAMILTONIAN_VARIATIONAL)
+        drift, states = self._drift(part), self._states(part)
+        momenta = tuple(sympy.Symbol(f"p_{number}", real=True) for number, _ in enumerate(states, 1))
+        action = (self.expression(part) * momenta[-1]) ** 2 / 2
+        energy = sum((p * b for p, b in zip(momenta, drift, strict=True)), action)
+        flow = sympy.Matrix([*(energy.diff(p) for p in momenta), *(-energy.diff(q) for q in states)])
+        size = 2 * len(states)
+        carried = sympy.Matrix(size, size, sympy.symbols(f"m:{size**2}", real=True))
+        variations = flow.jacobian([*states, *momenta]) * carried
+        variables = (*states, *momenta, sympy.Symbol("S", real=True), *carried)
+        yield from self._rate_distances(part, code, variables, (*flow, action, *variations))
+
+    def _rate_distances(
+        self, part: NoiseModel, code: Compiled, variables: tuple[sympy.Symbol, ...], rates: tuple[sympy.Expr, ...]
+    ) -> Iterator[float]:
+        """Rates at random states, without forcing."""
+        references = [Reference(printable(rate), variables, self.values(part)) for rate in rates]
         for _ in range(3):
             z = self.rng.uniform(-1, 1, code.size)
-            for rates in (code.derivative(z), code.rhs(z)):
-                for name, reference, found in zip(equations.variables, references, rates, strict=True):
-                    yield reference.check(f"the rate of {name} with {part!r}", z, found)
+            for name, reference, found in zip(variables, references, code.derivative(z), strict=True):
+                yield reference.check(f"the rate of {name} with {part!r}", z, found)

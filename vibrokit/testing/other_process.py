@@ -8,10 +8,12 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+import warnings
 from typing import Any
 
 import numpy as np
 
+from vibrokit.kernels.choice import CoarseStepsWarning
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.fixed_steps import RK4
 from vibrokit.kernels.kernel import write_sources
@@ -36,7 +38,9 @@ def outcome(scene: Oscillator) -> tuple[str, bytes]:
     starts = np.array([[0.3, 0.4], [-0.2, 0.9], [0.15, 0.0], [0.05, -0.6]])
     starts = np.hstack([starts, np.full((len(starts), extra), 0.1)])
     streams = None if scene.noise is None else streams_of(7, np.arange(len(starts)))
-    ended = run_ensemble(scene, flow, stepper, starts, 1, interval=1.0, streams=streams)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CoarseStepsWarning)  # the bits count, not their accuracy
+        ended = run_ensemble(scene, flow, stepper, starts, 1, interval=1.0, streams=streams)
     return write_sources(scene, flow, stepper).scene, ended.states.tobytes()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -16,6 +17,7 @@ from vibrokit.parts.spring import CubicSpring, Spring
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
+from vibrokit.testing.motion import Motion, follow, numeric
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.precise import derivative
 from vibrokit.testing.report import Check
@@ -31,12 +33,27 @@ class StateForceChecks(PartChecks[Spring | Friction]):
             Check("finite force", self.finite),
             Check("derivatives", self.derivatives),
             Check("compiled", self.compiled),
+            Check("motion", self.motion),
         )
 
     def scene(self, part: Spring | Friction) -> Oscillator:
         scene = Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=(Harmonic(0.2, 0.9),))
         parts: dict[str, Any] = {self.place: part}
         return dataclasses.replace(scene, **parts)
+
+    def motion(self) -> str:
+        """A short motion, the forcing and the damping of the scene included, agrees with SciPy's."""
+        return follow(map(self._motion, self.samples))
+
+    def _motion(self, part: Spring | Friction) -> Motion:
+        scene, force = self.scene(part), numeric(self.expression(part), self.arguments, self.values(part))
+        linear = 1.0 if scene.spring is None else 0.0
+
+        def rates(t: float, state: Any) -> tuple[float, float]:
+            x, v = map(float, state)
+            return v, 0.2 * math.cos(0.9 * t) - 0.1 * v - linear * x - force(x, v)
+
+        return Motion(part, scene, (0.3, 0.4), 1.0, rates)
 
     def compiled_distances(self, part: Spring | Friction) -> Iterator[float]:
         scene = Oscillator(
