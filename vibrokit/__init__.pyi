@@ -41,6 +41,7 @@ from .parts.contact import ContactLaw as ContactLaw
 from .parts.contact import CustomLaw as CustomLaw
 from .parts.contact import Hertz as Hertz
 from .parts.contact import Linear as Linear
+from .parts.dissipative import KelvinVoigt as KelvinVoigt
 from .parts.excitation import Constant as Constant
 from .parts.excitation import Excitation as Excitation
 from .parts.excitation import Harmonic as Harmonic

@@ -16,7 +16,7 @@ LOCATED = [vk.FreeFlight(tolerance=1e-13), vk.Order8(tolerance=1e-13)]
 
 
 def kelvin_voigt(adhesive=False, noise=None):
-    law = vk.CustomLaw("k*depth + c*rate", k=200.0, c=3.0)
+    law = vk.KelvinVoigt(stiffness=200.0, damping=3.0)
     return scene(
         vk.Barrier(law, 0.5, "right", adhesive),
         vk.Barrier(law, -0.5, "left", adhesive),
@@ -43,7 +43,7 @@ def test_derivatives_are_those_of_the_map(stepper, adhesive):
 def test_one_adhesive_bounce_in_closed_form(stepper):
     """Inside an adhesive Kelvin–Voigt stop at 0 the motion is linear: it leaves after half a damped period."""
     k, c = 200.0, 3.0
-    osc = scene(vk.Barrier(vk.CustomLaw("k*depth + c*rate", k=k, c=c), 0.0, "right", adhesive=True), damping_ratio=0.0)
+    osc = scene(vk.Barrier(vk.KelvinVoigt(k, c), 0.0, "right", adhesive=True), damping_ratio=0.0)
     damped = math.sqrt(1 + k - c**2 / 4)
     inside = math.pi / damped
     speed = 0.7 * math.exp(-c / 2 * inside)

@@ -70,9 +70,9 @@ def test_without_forcing_no_time():
 
 
 def test_a_clamped_law_says_when_it_pushes():
-    model = scene(vk.Barrier(vk.CustomLaw("k*depth + c*rate", k=50.0, c=3.0), 0.5, "right")).model
+    model = scene(vk.Barrier(vk.KelvinVoigt(50.0, 3.0), 0.5, "right")).model
     assert "if (x > b) & (c*v + k*(x - b) > 0) else 0" in str(model)
-    adhesive = scene(vk.Barrier(vk.CustomLaw("k*depth + c*rate", k=50.0, c=3.0), 0.5, "right", adhesive=True)).model
+    adhesive = scene(vk.Barrier(vk.KelvinVoigt(50.0, 3.0), 0.5, "right", adhesive=True)).model
     assert "& (" not in str(adhesive)
 
 
@@ -86,7 +86,7 @@ def test_a_clamped_law_says_when_it_pushes():
             {"conservative": False, "jumps": False, "clamped": True, "root": 2, "smooth": True},
         ),
         (
-            vk.CustomLaw("k*depth + c*rate", k=50.0, c=0.2),
+            vk.KelvinVoigt(50.0, 0.2),
             {"conservative": False, "jumps": True, "clamped": True, "root": 1, "smooth": True},
         ),
         (vk.CustomLaw("k*depth**1.3", k=50.0), {"conservative": True, "jumps": False, "smooth": False}),

@@ -24,9 +24,10 @@ class ContactLaw(Part):
     variables: ClassVar[tuple[str, ...]] = ("depth", "rate")
 
     def touch(self) -> tuple[bool, ...]:
-        """Whether the force at depth 0 vanishes, at rates −1, 0 and 1; nothing for laws that no value makes jump.
+        """Whether the force at depth 0 vanishes, at rates −1, 0 and 1; nothing for laws of the toolkit.
 
         The order of constants in a minimum or a maximum may decide it, so it is a part of what decides compiled code.
+        For laws of the toolkit the signs of their parameters decide it.
         """
         try:
             return () if self.is_ours() else tuple(bool(self.force(0.0, rate) == 0) for rate in (-1.0, 0.0, 1.0))
