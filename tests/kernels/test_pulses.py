@@ -88,6 +88,16 @@ def test_many_at_once_see_blows_and_jumps():
     assert isinstance(ensemble_stepper(scene, Flow.STATE), vk.Order8)
 
 
+@pytest.mark.parametrize("width", [0.3, 0.1, 0.02])
+def test_steps_with_noise_give_a_blow_its_impulse(width):
+    """A free mass gains J in each period; the noise is far below the error of the steps."""
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.0, spring=vk.LinearSpring(0.0), noise=vk.WhiteNoise(1e-30),
+        excitations=(Blows(0.5, width, PERIOD),),
+    )  # fmt: skip
+    assert osc.section_map([[0.0, 0.0]], 4, rng=0)[0, 1] == pytest.approx(2.0, rel=5e-3)
+
+
 def test_blow_that_never_repeats():
     scene = beam(Bump(0.5, 2e-2, 40.0))
     bell = lambda t, _: 0.5 / 2e-2 / math.sqrt(2 * math.pi) * math.exp(-(((t - 40.0) / 2e-2) ** 2) / 2)  # noqa: E731

@@ -24,6 +24,7 @@ _STEPS, _FEWEST_STEPS = 256, 32  # in an interval of a quarter of a free oscilla
 _MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
+_PER_NOISY_PULSE = 128  # that begins or ends with a jump
 _PER_PULSE, _PER_RISE, _PER_WAVE = 16, 4, 16  # steps in a pulse of an excitation, where it crosses its range, in a wave
 _TOLERANCE = 1e-10
 LOCATED = Order8(1e-6)
@@ -101,9 +102,15 @@ def _steps_needed(scene: Scene, flow: Flow) -> float:
 
 
 def _steps_of_changes(scene: Scene, flow: Flow) -> float:
-    """Steps that resolve the excitations; with noise, which no step resolves either, those that see each pulse."""
+    """Steps that resolve the excitations; with noise, which no step resolves either, those that see each pulse.
+
+    A step that a jump falls into is off by a third of the jump, so that 128 steps in a rectangular pulse give it an
+    impulse within 0.3 %.
+    """
     changes = changes_of(scene)
-    rises = 0.0 if flow is Flow.NOISY else _PER_RISE / changes.rise
+    rises = _PER_RISE / changes.rise
+    if flow is Flow.NOISY:
+        rises = min(rises, _PER_NOISY_PULSE / changes.pulse)
     return scene.time_unit * max(_PER_PULSE / changes.pulse, rises, _PER_WAVE / changes.wave)
 
 
