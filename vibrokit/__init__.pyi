@@ -34,6 +34,7 @@ from .kernels.located import FreeFlight as FreeFlight
 from .kernels.located import Order8 as Order8
 from .oscillator import Oscillator as Oscillator
 from .parts.barrier import Barrier as Barrier
+from .parts.chirp import Chirp as Chirp
 from .parts.coloured_noise import ColouredNoise as ColouredNoise
 from .parts.common_period import Ratio as Ratio
 from .parts.common_period import common_ratios as common_ratios
@@ -54,6 +55,7 @@ from .parts.noise import StateDependentNoise as StateDependentNoise
 from .parts.noise import StationaryNoise as StationaryNoise
 from .parts.noise import WhiteNoise as WhiteNoise
 from .parts.parameter import parameter as parameter
+from .parts.pulses import PulseTrain as PulseTrain
 from .parts.spring import CubicSpring as CubicSpring
 from .parts.spring import CustomSpring as CustomSpring
 from .parts.spring import LinearSpring as LinearSpring

@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
+from scipy.signal import chirp
 
 import vibrokit as vk
+from vibrokit.errors import NoSectionError, ParameterError
 from vibrokit.structure.linear_map import linear_map
 
 RESTITUTION, DASHPOT = 0.5, 0.255276  # of a clipped Kelvin–Voigt stop
@@ -107,3 +110,53 @@ def test_parts_in_a_scene_file_are_the_same_scene(tmp_path):
     text = (tmp_path / "support.toml").read_text()
     assert '"support-motion"' in text
     assert '"support-acceleration"' in text
+
+
+@pytest.mark.parametrize(("width", "rise"), [(0.1, 0.0), (0.1, 0.04), (0.1, 0.1), (2.4e-4, 0.0)])
+def test_a_free_mass_gains_the_impulse_of_each_pulse(width, rise):
+    train = vk.PulseTrain(0.5, 7.0, width, rise, delay=0.3)
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.0, spring=vk.LinearSpring(0.0), excitations=[train])
+    assert osc.trajectory((0.0, 0.1), periods=3, samples=4).v[-1] == pytest.approx(1.6, abs=1e-7)
+    assert osc.section_map([[0.0, 0.1]], 3)[0, 1] == pytest.approx(1.6, abs=1e-4)  # steps of tolerance 1e-6
+
+
+def test_pulses_are_as_high_as_their_impulse_says():
+    train = vk.PulseTrain.of_height(50.0, period=2.0, width=0.3, rise=0.1, delay=0.2)
+    assert train == vk.PulseTrain(15.0, 2.0, 0.3, 0.1, 0.2)
+    times = [0.1, 0.25, 0.35, 0.45, 0.55, 0.7, 2.25, -1.75]  # before, half up, on top, half down, after, a period on
+    assert [float(train.force(t)) for t in times] == pytest.approx([0, 25, 50, 50, 25, 0, 25, 25], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: vk.PulseTrain(0.5, 7.0, 2e-4), "PulseTrain: width must be from 1/30000 of the period .*got 0.0002"),
+        (lambda: vk.PulseTrain(0.5, 1.0, 0.9, 0.2), "PulseTrain: width must be .* to 0.8, got 0.9"),
+        (lambda: vk.PulseTrain(0.5, 1.0, 0.1, 0.2), "PulseTrain: rise must be at most the width, 0.1, got 0.2"),
+        (lambda: vk.PulseTrain(0.5, 0.0, 0.1), "PulseTrain: period must be a finite number greater than 0, got 0"),
+        (lambda: vk.PulseTrain(math.nan, 1.0, 0.1), "PulseTrain: impulse must be a finite number, got nan"),
+        (lambda: vk.Chirp(1.0, -1.0, 2.0, 10.0), "Chirp: start_frequency must be a finite number at least 0, got -1"),
+        (lambda: vk.Chirp(1.0, 1.0, 2.0, 0.0), "Chirp: duration must be a finite number greater than 0, got 0"),
+    ],
+)
+def test_what_is_no_pulse_or_chirp(make, said):
+    with pytest.raises(ParameterError, match=said):
+        make()
+
+
+def test_a_mass_under_a_chirp_moves_as_by_scipy():
+    sweep = vk.Chirp(0.2, 0.3, 2.0, 60.0, phase=math.pi / 6)
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=[sweep])
+    hertz = (0.3 / (2 * math.pi), 60.0, 2.0 / (2 * math.pi))
+    rate = lambda t, y: [y[1], 0.2 * chirp(t, *hertz, phi=30) - y[0] - 0.1 * y[1]]  # noqa: E731
+    swept = solve_ivp(rate, (0, 60), [0.1, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    after = solve_ivp(lambda t, y: [y[1], -y[0] - 0.1 * y[1]], (0, 10), swept, rtol=1e-12, atol=1e-13).y[:, -1]
+    ends = [osc.trajectory((0.1, 0.0), duration=end, samples=2).states[-1] for end in (60.0, 70.0)]
+    np.testing.assert_allclose(ends, [swept, after], atol=1e-7)
+
+
+def test_a_chirp_has_no_section():
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, excitations=[vk.Chirp(0.2, 0.3, 2.0, 60.0)])
+    for ask in (lambda: osc.period, lambda: osc.section_map([[0.0, 0.0]]), lambda: vk.find_structure(osc, rng=0)):
+        with pytest.raises(NoSectionError, match=r"never repeats.*no section.*trajectory"):
+            ask()

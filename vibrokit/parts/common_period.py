@@ -100,7 +100,8 @@ def common_period(periods: Sequence[float]) -> float:
     longest = max(periods)
     if math.isinf(longest):
         raise NoSectionError(
-            "scene: an excitation never repeats, so there is no section; give every excitation a finite period."
+            "scene: an excitation never repeats, so there is no section; give every excitation a finite period, or "
+            "follow the motion with trajectory(state, duration=...)."
         )
     multiple = 1
     for period in periods:

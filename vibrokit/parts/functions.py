@@ -20,6 +20,9 @@ def _sympy_function(name: str) -> Any:
 
 
 Rational = _sympy_function("Rational")
+Mod = _sympy_function("Mod")
+Piecewise = _sympy_function("Piecewise")
+And = _sympy_function("And")
 Abs = _sympy_function("Abs")
 Max = _sympy_function("Max")
 Min = _sympy_function("Min")
