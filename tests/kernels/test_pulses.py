@@ -57,12 +57,11 @@ def beam(excitation, unit=1.0, **more):
     return vk.Oscillator(natural_frequency=rate, damping_ratio=0.05, excitations=(excitation,), spring=spring, **more)
 
 
-def by_pieces(force, cuts):
+def by_pieces(force, cuts, state=START, cubic=0.3):
     """The end of the motion of the beam under a force of (time, number of the piece)."""
-    state = START
     for piece, (begin, end) in enumerate(itertools.pairwise(cuts)):
         solution = solve_ivp(
-            lambda t, y, piece=piece: [y[1], force(t, piece) - y[0] - 0.3 * y[0] ** 3 - 0.1 * y[1]],
+            lambda t, y, piece=piece: [y[1], force(t, piece) - y[0] - cubic * y[0] ** 3 - 0.1 * y[1]],
             (begin, end), state, method="DOP853", rtol=1e-12, atol=1e-13, max_step=(end - begin) / 20,
         )  # fmt: skip
         state = solution.y[:, -1]
@@ -86,6 +85,18 @@ def test_many_at_once_see_blows_and_jumps():
     scene = beam(Blows(0.5, 0.01, PERIOD))
     assert np.allclose(scene.section_map([START], 3)[0], blown(0.01, 3), rtol=0, atol=1e-4)
     assert isinstance(ensemble_stepper(scene, Flow.STATE), vk.Order8)
+
+
+@pytest.mark.parametrize("impulse", [0.5, 5e-9])
+def test_a_mass_at_rest_is_met_by_a_pulse_that_begins_smoothly(impulse):
+    """From exactly (0, 0), where no size is known, the displacement begins as the fourth power of time."""
+    osc = beam(vk.PulseTrain(impulse, PERIOD, 0.1, 0.1, delay=3.0))
+    edge = lambda u: u * u * (3 - 2 * u)  # noqa: E731
+    pulse = lambda t, p: impulse / 0.1 * (0, edge((t - 3) / 0.1), edge((3.2 - t) / 0.1), 0)[p]  # noqa: E731
+    cuts = [0.0, 3.0, 3.1, 3.2, PERIOD]
+    path = osc.trajectory((0.0, 0.0), periods=1, samples=2)
+    expected = by_pieces(lambda t, piece: pulse(t, piece) / impulse, cuts, (0.0, 0.0), 0.3 * impulse**2)
+    assert np.allclose(path.states[-1] / impulse, expected, rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("width", [0.3, 0.1, 0.02])
@@ -131,7 +142,7 @@ def test_times_of_changes():
     found = changes_of(beam(Blows(0.5, 0.01, PERIOD)))
     assert 0.01 / 1.5 < found.pulse < 0.01 * 1.5
     assert found.rise < 1e-3
-    assert changes_of(beam(vk.Harmonic(0.5, 200.0))) == (math.inf, math.inf, pytest.approx(2 * math.pi / 200.0))
+    assert changes_of(beam(vk.Harmonic(0.5, 200.0))) == (math.inf, math.inf, pytest.approx(2 * math.pi / 200.0), 0.0)
 
 
 def test_frequencies_far_above_that_of_the_mass_are_resolved():

@@ -20,6 +20,7 @@ FINEST, COARSEST = 1e-15, 1e-2
 MOST_STEPS = 200_000.0
 """In one interval; motion that needs more is given up."""
 _IN_PULSE = 3.0  # a step of so many pulses has a stage in each: no two of its nodes are farther apart than 0.27
+_SMALL = 1e-12  # of the displacement by a force, to be at rest
 # What jumps when a stop is touched or left, or where its law changes its sign: nothing, the derivatives M and the
 # covariance, momenta, momenta and their derivatives; or derivatives of momenta diverge at a touch, and motion ends.
 NOTHING, LINEARIZED, MOMENTA, EXTREMALS, DIVERGING = 0.0, 1.0, 2.0, 3.0, 4.0
@@ -55,11 +56,13 @@ class LocatedStepper(Stepper):
     def settings(self, scene: Scene, interval: float, samples: int = 0) -> tuple[float, ...]:
         """Tolerance, most steps in an interval, intervals until the forcing repeats (0: never), 1/ω_n.
 
-        Then the time over which motion goes on, 0 where each interval begins anew, and the longest step (s).
+        Then the time over which motion goes on, 0 where each interval begins anew, the longest step (s), and the least
+        size by which the error of x is measured (m).
         """
-        cycle, longest = 0 if samples else scene.intervals_in_period(interval), _IN_PULSE * changes_of(scene).pulse
-        lapse = interval * samples
-        return float(self.tolerance), MOST_STEPS, float(cycle), 1.0 / scene.reference_frequency, lapse, longest
+        cycle, changes = 0 if samples else scene.intervals_in_period(interval), changes_of(scene)
+        lapse, unit = interval * samples, 1.0 / scene.reference_frequency
+        longest, floor = _IN_PULSE * changes.pulse, _SMALL * changes.size * unit**2
+        return float(self.tolerance), MOST_STEPS, float(cycle), unit, lapse, longest, floor
 
     def scene_part(self, text: SceneText) -> list[str]:
         """The right-hand side with switched stops, the stops, and the slopes of all lanes.

@@ -39,13 +39,17 @@ class Changes(NamedTuple):
     pulse: float  # for which the force is larger, or smaller, than before and after
     rise: float  # in which the force would cross its range at its greatest slope
     wave: float = math.inf  # period of the highest frequency of sinusoids, which need no search for pulses
+    size: float = 0.0  # range of the largest other force (m s⁻²)
 
 
 def changes_of(scene: Scene) -> Changes:
     """Return the shortest times in which the excitations of a scene change."""
     turns = _TURNS * 2 * math.pi / scene.reference_frequency
     found = [_changes(part, turns if math.isinf(part.period or math.inf) else math.inf) for part in scene.excitations]
-    return Changes(*map(min, zip(*found, strict=True))) if found else Changes(math.inf, math.inf)
+    if not found:
+        return Changes(math.inf, math.inf)
+    pulses, rises, waves, sizes = zip(*found, strict=True)
+    return Changes(min(pulses), min(rises), min(waves), max(sizes))
 
 
 @functools.lru_cache(maxsize=64)
@@ -66,7 +70,7 @@ def _changes(part: Excitation, longest: float) -> Changes:
     steepest = np.abs(np.diff(force, append=force[0] if repeats else force[-1])).max()
     width = bisect.bisect_left(_WIDTHS, True, key=lambda width: _removes(width, force, 0.01 * size, repeats))
     pulse = _WIDTHS[width] * spacing if width < len(_WIDTHS) else math.inf
-    return Changes(pulse, float(size / steepest) * spacing)
+    return Changes(pulse, float(size / steepest) * spacing, size=size)
 
 
 def _removes(width: int, force: Array, least: float, repeats: bool) -> bool:

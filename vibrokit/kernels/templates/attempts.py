@@ -71,11 +71,12 @@ def attempt(lanes, pushing, theta, room, facts):
 
 
 @njit(**INNER_LANES)
-def misfit(lanes, tolerance, span, facts):
+def misfit(lanes, tolerance, span, floor, facts):
     """Find the ERROR of each attempt in units of the tolerance, and the FACTOR by which to lengthen the next.
 
     The error is the largest over the blocks of rows, each measured by its own size; a velocity near 0 by a hundredth of
-    x over `span`, the time to integrate over.
+    x over `span`, the time to integrate over. Where a force finds the mass at rest at 0, x is measured by `floor`: its
+    own size begins there as a power of time, for which no step is short enough.
     """
     keep_apart(), use_widest_registers()
     rows, stride = size_of(lanes) - CLOCK, ROW * LANES
@@ -85,13 +86,13 @@ def misfit(lanes, tolerance, span, facts):
     most, haze, blocks = offset_by(lanes, MOST), offset_by(lanes, HAZE), offset_by(facts, BLOCKS)
     add_estimates(sizes, fifths, thirds, start, end, offset_by(lanes, LENGTH), slopes, stride, rows)
     join_rows(sizes, blocks, rows)
-    choose_units(tolerance, span, lanes)
+    choose_units(tolerance, span, floor, lanes)
     compare_rows(most, sizes, haze, fifths, thirds, end, blocks, int(facts[HAZY]), rows)
     conclude_errors(lanes)
 
 
 @njit(**INNER_LANES)
-def choose_units(tolerance, span, lanes):
+def choose_units(tolerance, span, floor, lanes):
     """Replace the sizes of t and v by the units of their errors; write the tolerance and the haze of each lane.
 
     No step must be more accurate than the rounding of x allows: GRAIN is the uncertainty of the acceleration from it.
@@ -99,6 +100,7 @@ def choose_units(tolerance, span, lanes):
     """
     for lane in range(LANES):
         clock, reach, speed = CLOCK * LANES + lane, lanes[SIZES + lane], lanes[SIZES + LANES + lane]
+        reach = floor if floor > reach else reach
         least = 0.01 * reach / span
         speed = speed if speed > least else least
         allowed, haze = tolerance, 1.0
@@ -111,7 +113,7 @@ def choose_units(tolerance, span, lanes):
             haze = haze / allowed if haze > allowed else 1.0
         lapse = reach / (abs(lanes[TRIAL + LANES + lane]) + reach / span)
         lanes[SIZES + clock] = lapse if lapse < span else span
-        lanes[SIZES + LANES + lane] = speed
+        lanes[SIZES + lane], lanes[SIZES + LANES + lane] = reach, speed
         lanes[ALLOWED + lane], lanes[HAZE + lane] = allowed, haze
 
 

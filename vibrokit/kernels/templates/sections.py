@@ -158,6 +158,6 @@ def advance(
         used += 1
         if active > 0:
             attempt(lanes, pushing, theta, room, facts)
-            misfit(lanes, settings[0], abs(span), facts)
+            misfit(lanes, settings[0], abs(span), settings[6], facts)
     place[0], place[1] = waiting, active
     return used
