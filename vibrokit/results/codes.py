@@ -91,6 +91,12 @@ class Code(StrEnum):
         "Narrow the region, or check the signs of the forces.",
     )  # fmt: skip
     STARTS_ENDED = "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged."
+    STARTS_NEUTRAL = (
+        "starts-neutral", WARNING,
+        "{count} of {starts:start} settled at places that no force determines, on motions of a family, which attract "
+        "none beside them and are no attractors.",
+        "Give the scene a spring, or a force that presses the mass to a stop.",
+    )  # fmt: skip
     STARTS_STALLED = (
         "starts-stalled", WARNING,
         "{count} of {starts:start} were not followed to their end, because they need too many steps in a section "

@@ -34,6 +34,7 @@ from vibrokit.structure.basins.landings import copies_in, lies_in, on_circle
 from vibrokit.structure.basins.stop_cells import MARGIN
 from vibrokit.structure.boundaries.saddles import SOON, SaddleSearch
 from vibrokit.structure.manifolds import BRANCHES, default_arc_length, grow_manifolds
+from vibrokit.structure.neutral import refuse_unheld
 from vibrokit.structure.persistence import LONGEST_WAIT, periods_of, persistent_stepper, slowest_rate, wait_of
 from vibrokit.structure.regions import frame_of, regions_over_tops, search_region
 from vibrokit.structure.rest import in_front_of_stops, tops_around
@@ -53,6 +54,7 @@ class Finder:
     def __init__(self, osc: Oscillator, request: Request, executor: concurrent.futures.Executor | None) -> None:
         self.osc, self.request, self.region, self.executor = osc, request, request.region, executor
         self.rng = np.random.default_rng(request.rng)
+        refuse_unheld(osc)
         self.wait = wait_of(osc)
         self.budget = request.budget or self.wait
         self.orbit_stepper = request.stepper or single_stepper(osc, Flow.STATE_VARIATIONAL)

@@ -19,13 +19,14 @@ def bracketed_roots(function: Callable[[float], float], places: Array, values: A
 
     Roots lie where the sign changes. Where the function comes near 0 and turns back, the place nearest to 0 is located,
     so that the two roots of a pair closer together than the samples are found. Values that are not finite bound a part
-    without roots.
+    without roots. Where the function is 0 all along a stretch, there is none.
     """
 
     def root(low: float, high: float) -> float:
         return float(brentq(function, low, high, xtol=min(2e-12, 1e-10 * (high - low))))  # in any unit
 
-    found = [float(place) for place in places[values == 0]]
+    zero = np.concatenate([[False], values == 0, [False]])
+    found = [float(place) for place in places[zero[1:-1] & ~zero[:-2] & ~zero[2:]]]
     crossed = np.flatnonzero(values[:-1] * values[1:] < 0)
     found += [root(places[at], places[at + 1]) for at in crossed]
     sizes = np.abs(values)

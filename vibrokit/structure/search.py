@@ -26,6 +26,7 @@ from vibrokit.structure.attractors.wandering import follow, kind_of, lyapunov_ex
 from vibrokit.structure.autonomous import Equilibrium, equilibria, find_cycle
 from vibrokit.structure.basins.stop_cells import wells
 from vibrokit.structure.known_motions import known_motions
+from vibrokit.structure.neutral import is_neutral
 from vibrokit.structure.orbits import EQUAL, LONGEST_PERIOD, arrival_at, least_period, refine_orbit, same_point, visited
 from vibrokit.structure.persistence import is_on_cycle
 from vibrokit.structure.scales import length_of, units_of
@@ -57,6 +58,7 @@ class Search:
         self.starts = self.diverged = self.stalled = 0  # stalled: they need too many steps in a section interval
         self.unsettled = np.empty((0, 2))  # states of the starts that have not settled, after so many periods
         self.periods = 0
+        self.neutral = 0  # starts that have settled on motions of families, which are no attractors
         self.long_motion: list[Finding] = []
         self.beyond = {"followed": 0, "diverged": 0, "moving": 0}  # motions that were followed on, and how these ended
 
@@ -124,6 +126,8 @@ class Search:
             found.append(Finding.of(Code.STARTS_ENDED, count=self.diverged, starts=self.starts, where=where))
         elif self.diverged:
             found.append(Finding.of(Code.STARTS_DIVERGED, count=self.diverged, starts=self.starts))
+        if self.neutral:
+            found.append(Finding.of(Code.STARTS_NEUTRAL, count=self.neutral, starts=self.starts))
         if self.stalled:
             found.append(Finding.of(Code.STARTS_STALLED, count=self.stalled, starts=self.starts))
         if followed := self.beyond["followed"]:
@@ -145,6 +149,11 @@ class Search:
             where = self.osc.model.conditions
             ended = f"end where the forces do ({where})" if where else "grow without bound"
             advice = f"most motions {ended}; narrow the region, or check the signs of the forces"
+        if self.neutral > self.starts / 2:
+            advice = (
+                f"{self.neutral} settle at places that no force determines, on motions that attract none beside them; "
+                "give the scene a spring, or a force that presses the mass to a stop"
+            )
         if self.stalled > self.starts / 2:
             advice = f"{self.stalled} need too many steps; take softer laws, or friction that is smoother"
         return (
@@ -192,6 +201,7 @@ class Search:
         for index in np.flatnonzero(settled):
             period = int(np.argmax(close[:, index])) + 1
             settled[index] = self._known(path[0, index], _NEAR) or self._add_orbit(path[0, index], period)
+            self.neutral += bool(settled[index]) and not self._known(path[0, index], _NEAR)
         self._guess(path[:, ~settled], distance[:, ~settled])
         return path[0, ~settled]
 
@@ -213,14 +223,15 @@ class Search:
             orbit = least_period(self.osc, refine_orbit(self.osc, point, period, stepper), stepper)
         except StructureError:
             return False
-        if np.abs(orbit.multipliers).max() >= 1:
+        neutral = is_neutral(orbit.multipliers)
+        if np.abs(orbit.multipliers).max() >= 1 and not neutral:
             return False  # the motion passes near a saddle
         points = visited(self.osc, orbit, stepper)
         if not same_point(self.osc, point, points, 0.1):
             return False  # Newton's method went far away
         if is_cycle(self.osc, orbit, stepper):
             return False  # its own duration is unknown here; see `_add_cycles`
-        if not self._known(orbit.point, EQUAL):
+        if not neutral and not self._known(orbit.point, EQUAL):
             self.attractors.append(describe_orbit(self.osc, orbit, stepper))
         return same_point(self.osc, point, points, _NEAR)
 

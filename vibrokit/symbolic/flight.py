@@ -19,7 +19,7 @@ class FlightWriter:
 
     The Taylor series solves a linear system under sinusoidal forces: at order 22, a step of 1.5 divided by the largest
     rate is exact to rounding, at any damping and at resonance. StepperError is raised where the motion between stops is
-    not linear, or a force is not a sum of sinusoids.
+    not linear, or a force is not a sum of sinusoids and a mean.
     """
 
     def __init__(self, model: Equations, equations: FlowEquations) -> None:
@@ -99,7 +99,10 @@ class FlightWriter:
 
 
 def sinusoids(model: Equations) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr]]:
-    """Split the forcing into sinusoids: (ω, even, odd) of each, the value and its derivative divided by ω."""
+    """Split the forcing into sinusoids: (ω, even, odd) of each, the value and its derivative divided by ω.
+
+    A mean is one of frequency 0.
+    """
     time = model.time
     forcing = sympy.expand(sympy.fu(sympy.expand(model.forcing))) if model.forcing.has(sympy.Pow) else model.forcing
     waves = []
@@ -107,6 +110,9 @@ def sinusoids(model: Equations) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr
         if term == 0:
             continue
         factor, wave = term.as_independent(time)
+        if wave == 1:  # the mean
+            waves.append((sympy.Integer(0), term, sympy.Integer(0)))
+            continue
         if not isinstance(wave, sympy.cos | sympy.sin) or sympy.diff(wave.args[0], time, 2) != 0:
             raise StepperError(
                 f"FreeFlight needs excitations that are sums of sinusoids, got {term}; use Order8 or RK4."

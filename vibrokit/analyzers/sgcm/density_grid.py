@@ -57,7 +57,9 @@ class DensityGrid:
         widened = 2.0 * np.ptp(region.x) / shape[0]
         places = np.linspace(region.x[0] - widened, region.x[1] + widened, 4001)
         stiffness = -VectorField(osc).jacobian(np.stack([places, np.zeros_like(places)], axis=-1))[:, 1, 0]
-        relative = np.sqrt(np.abs(stiffness) / np.median(np.abs(stiffness)))
+        # Where a mass without a spring is free, the median is 0.
+        outside = float(np.median(np.abs(stiffness))) or osc.reference_frequency**2
+        relative = np.sqrt(np.abs(stiffness) / outside)
         density = gaussian_filter1d(np.clip(relative, 1.0, 20.0) ** (2 / 3), 0.01 * len(places), mode="nearest")
         count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
         counted = CubicSpline(places, count)
