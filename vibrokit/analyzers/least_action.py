@@ -15,7 +15,15 @@ from vibrokit.analyzers.polishing.certified import METHOD
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.analyzers.road import ExitRoad
 from vibrokit.analyzers.shooting.shooting import Shooting
-from vibrokit.analyzers.sources import ClosestApproach, Graph, MirrorImages, Relaxations, Shots, Source
+from vibrokit.analyzers.sources import (
+    ClosestApproach,
+    Graph,
+    MirrorImages,
+    Relaxations,
+    RelaxationsWithoutMemory,
+    Shots,
+    Source,
+)
 from vibrokit.arguments import whole
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.energy import Bound
@@ -113,7 +121,7 @@ class LeastAction(Analyzer):
         shoots = self.shooting is not None and problem.attractor.is_fixed
         graph = None if self.graph is None else Graph(self.graph, shots_follow=shoots)
         shots = None if self.shooting is None else Shots(self.shooting)
-        sources = (Relaxations(), graph, shots, MirrorImages(), ClosestApproach(graph))
+        sources = (Relaxations(), RelaxationsWithoutMemory(), graph, shots, MirrorImages(), ClosestApproach(graph))
         return [source for source in sources if source is not None]
 
     def _analyzing(self) -> Callable[[ExitProblem], Analysis]:

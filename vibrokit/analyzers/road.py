@@ -15,7 +15,7 @@ from vibrokit.analyzers.analyzer import Analysis
 from vibrokit.analyzers.graph.beginnings import beginnings
 from vibrokit.analyzers.graph.known_paths import KnownPaths
 from vibrokit.analyzers.graph.solution import GraphSolution
-from vibrokit.analyzers.paths import detailed_balance
+from vibrokit.analyzers.paths import detailed_balance, without_memory
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.polishing.polish import Polishing, Shared
@@ -53,7 +53,7 @@ class ExitRoad:
         self.problem, self.sources, self._accuracy, self._orbits = problem, sources, accuracy, orbits
         self._graph = next((source for source in sources if isinstance(source, Graph)), None)
         self._shots = next((source for source in sources if isinstance(source, Shots)), None)
-        self._least = detailed_balance.least_actions(problem)
+        self._least = without_memory.least_actions(problem)
         self._polishings: list[Polishing] | None = None  # one for each orbit that paths leave; None before the first
         self._cut = False  # whether a step was stopped
         self._findings: list[Finding] = []
@@ -128,7 +128,7 @@ class ExitRoad:
         except Exception as error:  # a source may be anybody's
             told = error if isinstance(error, VibrokitError) else StructureError(f"{type(error).__name__}: {error}")
             alone = source.searches and not any(other.searches for other in self.sources if other is not source)
-            if alone and not found and self.solution is None:
+            if alone and not found and self.solution is None and not self._polished[0]:
                 raise told from error
             self._failed(source.name, str(told))
         else:

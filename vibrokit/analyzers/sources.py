@@ -16,6 +16,8 @@ from vibrokit.analyzers.paths.candidate import Candidate, same_action
 from vibrokit.analyzers.paths.mirror import FINDER as MIRROR
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+from vibrokit.analyzers.paths.without_memory import FINDER as WITHOUT_MEMORY
+from vibrokit.analyzers.paths.without_memory import WithoutMemory
 from vibrokit.analyzers.polishing.ends import pieces_of
 from vibrokit.analyzers.polishing.path_solver import Effort
 from vibrokit.analyzers.problem import ExitProblem
@@ -133,6 +135,22 @@ class Relaxations(Source):
             exact = bool(least) and all(each.bound is Bound.EXACT for each in least)
             self.effort = Effort.SHOOT if exact else Effort.FROM_ORBIT
         return [*found, *slow]
+
+
+class RelaxationsWithoutMemory(Source):
+    """Where the noise has extra states: the relaxations run backwards of the same scene under white noise.
+
+    Shooting misses the paths of a noise that is much faster than the mass: almost all extremals follow the noise.
+    """
+
+    name = WITHOUT_MEMORY
+    expected = False
+    effort = Effort.FROM_ORBIT
+
+    def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Iterable[Candidate]:
+        """Return those to an equilibrium, for polishing from their states."""
+        with stage(self.name, subject=problem.attractor.name, unit=TRAJECTORIES):
+            return tuple(WithoutMemory(problem).candidates(max(pieces_of(problem.scene))))
 
 
 class Graph(Source):

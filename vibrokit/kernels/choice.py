@@ -14,7 +14,7 @@ from vibrokit.kernels.fixed_steps import RK4, FixedSteps
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.kernels.located import FreeFlight, Order8
 from vibrokit.kernels.stepper import Stepper
-from vibrokit.kernels.time_scales import changes_of, contact_times
+from vibrokit.kernels.time_scales import changes_of, contact_times, fastest_of_noise
 from vibrokit.parts.noise import WhiteNoise
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import LinearSpring
@@ -25,6 +25,7 @@ _MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscil
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
 _PER_NOISY_PULSE = 128  # that begins or ends with a jump
+_PER_DECAY = 4  # steps in which a state of the noise decays by e
 _PER_PULSE, _PER_RISE, _PER_WAVE = 16, 4, 16  # steps in a pulse of an excitation, where it crosses its range, in a wave
 _TOLERANCE = 1e-10
 LOCATED = Order8(1e-6)
@@ -96,6 +97,7 @@ def _steps_needed(scene: Scene, flow: Flow) -> float:
     unit = scene.time_unit
     turns = _turns(scene)
     needed = max(_FEWEST_STEPS, _STEPS * min(1.0, 4.0 * turns), _PER_TURN * turns, _steps_of_changes(scene, flow))
+    needed = max(needed, _PER_DECAY * unit * fastest_of_noise(scene))
     for contact in contact_times(scene, flow):
         needed = max(needed, _steps_per_contact(contact.exponent) * unit / contact.duration)
     return needed

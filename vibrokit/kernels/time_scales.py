@@ -83,6 +83,16 @@ def _removes(width: int, force: Array, least: float, repeats: bool) -> bool:
     return bool((changed if repeats else changed[width:-width]).max() > least)
 
 
+@functools.lru_cache(maxsize=64)
+def fastest_of_noise(scene: Scene) -> float:
+    """Return the fastest rate (s⁻¹) of the extra states of the noise, where all states are 0; 0 if it has none."""
+    extra = scene.noise.extra_states if scene.noise is not None else ()
+    if not extra:
+        return 0.0
+    rates = VectorField(scene).jacobian(np.zeros(2 + len(extra)))[2:, 2:]
+    return float(np.abs(np.linalg.eigvals(rates)).max()) if np.isfinite(rates).all() else 0.0
+
+
 class ContactTime(NamedTuple):
     """Duration of a typical contact, and how sharply it begins."""
 

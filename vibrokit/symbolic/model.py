@@ -12,6 +12,7 @@ from vibrokit.symbolic.contact import RATE
 from vibrokit.symbolic.domain import Domain, border_ahead
 from vibrokit.symbolic.equations import Equations
 from vibrokit.symbolic.mathml import definition, rate_equation
+from vibrokit.symbolic.noise_filter import NoiseFilter
 from vibrokit.symbolic.printer import as_latex, as_text
 
 
@@ -81,6 +82,11 @@ class Model(Equations):
     def jacobian(self) -> sympy.Matrix:
         """∂b/∂q, n × n."""
         return self.drift.jacobian(list(self.state))
+
+    @cached_property
+    def noise_filter(self) -> NoiseFilter | None:
+        """What white noise passes before it acts on the mass; None if nothing, or no linear filter."""
+        return NoiseFilter.of(self)
 
     @cached_property
     def undamped(self) -> bool:

@@ -14,6 +14,7 @@ from vibrokit.analyzers.polishing.endings import FaceEnding, SaddleEnding
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.problem import ExitProblem
 from vibrokit.errors import StructureError
+from vibrokit.kernels.time_scales import fastest_of_noise
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
@@ -101,6 +102,11 @@ def ending_at(end: PathEnd, problem: ExitProblem, propagator: SegmentPropagator)
 
 
 def pieces_of(scene: Oscillator) -> tuple[int, int]:
-    """Return the numbers of pieces of a section interval that paths are solved with, in turn; more in a long one."""
+    """Return the numbers of pieces of a section interval that paths are solved with, in turn; more in a long one.
+
+    The extra states of the noise decay by e⁸ in a piece at most, and momenta grow by as much.
+    """
     coarse = 8 * 2 ** doublings_of(scene)
+    while fastest_of_noise(scene) * scene.section_interval > 8.0 * coarse:
+        coarse *= 2
     return coarse, 2 * coarse

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vibrokit.analyzers.path_ends import PathEnd
 from vibrokit.analyzers.paths.candidate import Candidate, same_action
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
-from vibrokit.analyzers.polishing.ends import Nodes
+from vibrokit.analyzers.polishing.ends import Nodes, pieces_of
 from vibrokit.analyzers.polishing.extremal_path import ExtremalPath
 from vibrokit.analyzers.polishing.linearize import linearized_orbit
 from vibrokit.analyzers.polishing.path_solver import Effort, PathSolver
@@ -70,7 +70,7 @@ class Leg:
 
 def samples_of(scene: Oscillator) -> int:
     """Return the number of samples of a path in a section interval: a multiple of each number of pieces."""
-    return _SAMPLES * 2 ** doublings_of(scene)
+    return max(_SAMPLES * 2 ** doublings_of(scene), *pieces_of(scene))
 
 
 class LegSolver:

@@ -70,8 +70,8 @@ class Search:
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The exit paths as guesses for polishing, the cheapest first."""
-        return tuple(branch.candidate for branch in self.branches)
+        """The exit paths as guesses for polishing, the cheapest first; one that leaves at once is none."""
+        return tuple(branch.candidate for branch in self.branches if len(branch.candidate.times) > 1)
 
     @property
     def best(self) -> tuple[Branch, ...]:
