@@ -1,5 +1,6 @@
 """Every snippet of the README and the manual does what it says."""
 
+import math
 import re
 import runpy
 import shlex
@@ -87,6 +88,25 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert made["rare"].rates[0].log_value == pytest.approx(-21.71, abs=3 * made["rare"].rates[0].log_error)
         assert "commitment" in printed
         assert "False True True" in printed
+    elif page.stem == "spring":
+        assert "FAILED" not in printed
+        errors = dict(re.findall(r"^(\d\.0 \d+) (\S+)$", printed, re.MULTILINE))
+        order = {k: math.log(float(errors[f"{k} 64"]) / float(errors[f"{k} 4096"]), 64) for k in ("4.0", "3.0")}
+        assert order["4.0"] > 3.5
+        assert order["3.0"] == pytest.approx(2, abs=0.5)
+        rows = [
+            row.split() for row in page.read_text(encoding="utf-8").splitlines() if re.match(r"(64|256|\d{4}) ", row)
+        ]
+        for steps, *shown in rows:  # the table of the page
+            for k, error in zip(("4.0", "3.0"), shown, strict=True):
+                assert float(errors[f"{k} {steps}"]) == pytest.approx(float(error), rel=0.5)
+    elif page.stem == "friction":
+        assert float(printed.split()[-1]) == pytest.approx(2.0, rel=1e-7)
+        assert "FAILED" not in printed
+    elif page.stem == "conformance-kit":
+        assert "Wave, an excitation, fails 1 of " in printed
+        assert "but its force repeats after 1/2 of it" in printed
+        assert "FAILED" not in printed
     elif page.stem == "steppers":
         assert "RK4: steps must be a whole number from 1 to 10000000, got 0." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)

@@ -1,4 +1,4 @@
-"""The command line: vibrokit assess, sweep, run, reconcile, report, reproduce, plot, equations, list, check, trade."""
+"""The command line, vibrokit: its entry point, and the reading of its arguments."""
 
 from __future__ import annotations
 

@@ -154,6 +154,16 @@ COMMANDS = (
         (_SCENE, _argument("--latex", action="store_true", help="as LaTeX")),
     ),
     Command("list", "listing:list_names", "list scenes, parts with their parameters, analyzers, exits and records"),
+    Command(
+        "new-plugin", "new_plugin:new_plugin", "write a distribution with a part of your own to start from",
+        (
+            _argument("name", help="name of the distribution, such as my-law; also that of its folder, which is made"),
+            _argument("--kind", default="contact-law",
+                      help="contact-law (default), spring, friction, excitation, noise or analyzer"),
+        ),
+        "Write a folder with pyproject.toml, a class with a small formula, its test and a README. It can be installed "
+        "and passes its test.",
+    ),
     Command("check", "toolkit:check_part", "check a registered part against the conformance kit", (_argument("name"),)),
     Command(
         "plot", "saved:plot_file", "draw a saved result",
