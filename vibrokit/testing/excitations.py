@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import mpmath
 import sympy
@@ -16,11 +16,12 @@ from vibrokit.registry import Group
 from vibrokit.symbolic.flow_kind import Flow
 from vibrokit.testing.compiled import Compiled
 from vibrokit.testing.forced import Forcing, motion_from_rest
-from vibrokit.testing.motion import SAME, compare
+from vibrokit.testing.motion import SAME, Motion, compare, numeric, reference_end
 from vibrokit.testing.part_checks import PartChecks
 from vibrokit.testing.report import Check, ConformanceError
 
 _FRACTIONS = (2, 3, 5, 7)
+_PLACE = (0.6, -0.4)  # a state in which a force that depends on it is followed in time
 _LONG = 20 * math.pi  # a motion under a force that never repeats: ten free oscillations
 _SAME_OF_MANY = 1e-2  # of the size of the motion: fixed steps see a jump within one of them
 
@@ -69,14 +70,18 @@ class ExcitationChecks(PartChecks[Excitation]):
         return ", ".join(dict.fromkeys(periods))
 
     def _forcing(self, part: Excitation) -> Forcing:
-        return Forcing(self.expression(part), self.arguments[0], self.values(part))
+        """The force along time, in one state if it depends on the state."""
+        place: dict[sympy.Symbol, float] = dict(zip(self.arguments[1:], _PLACE, strict=False))
+        return Forcing(self.expression(part).subs(place), self.arguments[0], self.values(part))
 
     def _change(self, part: Excitation, shift: float) -> float:
         """The largest change of the force after a shift in time, over its size, at times that seldom are of jumps."""
-        force = self.reference(part).exact
+        exact, place = self.reference(part).exact, _PLACE[: len(self.arguments) - 1]
         times = [(mpmath.mpf(k) + 1 / mpmath.pi) * shift / 37 for k in range(-37, 370, 11)]  # ten shifts
-        size = max(abs(force(t)) for t in times)
-        return float(max(abs(force(t + shift) - force(t)) for t in times) / size) if size else 0.0
+        here = [exact(t, *place) for t in times]
+        size = max(map(abs, here))
+        changes = (abs(exact(t + shift, *place) - force) for t, force in zip(times, here, strict=True))
+        return float(max(changes) / size) if size else 0.0
 
     @staticmethod
     def _declared_period(part: Excitation) -> float | None:
@@ -92,7 +97,7 @@ class ExcitationChecks(PartChecks[Excitation]):
         return period
 
     def motion(self) -> str:
-        """From rest a linear oscillator moves as Duhamel's integral says, jumps and pulses included.
+        """A linear oscillator moves as Duhamel's integral says, jumps and pulses included, or SciPy with the state.
 
         A single trajectory has to agree closely, and the section map, whose force is a table of times, more coarsely.
         """
@@ -100,14 +105,27 @@ class ExcitationChecks(PartChecks[Excitation]):
         for part in self.samples:
             period = self._declared_period(part) or 2 * math.pi
             duration = period if math.isfinite(period) else _LONG
-            scene, ended = self.scene(part), motion_from_rest(self._forcing(part), 0.05, duration)
-            if ended[1] == 0.0:
+            scene, start = self.scene(part), _PLACE if len(self.arguments) > 1 else (0.0, 0.0)
+            ended = self._ended(part, start, duration)
+            if ended is None or ended[1] == 0.0:
                 continue
-            end = scene.trajectory((0.0, 0.0), duration=duration, samples=4).states[-1]
+            end = scene.trajectory(start, duration=duration, samples=4).states[-1]
             worst = max(worst, compare(part, duration, end, ended, SAME))
             if math.isfinite(period):
-                compare(part, duration, scene.section_map([(0.0, 0.0)])[0], ended, _SAME_OF_MANY)
-        return f"within {worst:.1g} of Duhamel's integral"
+                compare(part, duration, scene.section_map([start])[0], ended, _SAME_OF_MANY)
+        return f"within {worst:.1g} of {'SciPy' if len(self.arguments) > 1 else 'an integral'}"
+
+    def _ended(self, part: Excitation, start: tuple[float, float], duration: float) -> tuple[Any, float] | None:
+        """The end of a motion and its size; None if it runs away."""
+        if len(self.arguments) == 1:
+            return motion_from_rest(self._forcing(part), 0.05, duration)
+        force = numeric(self.expression(part), self.arguments, self.values(part))
+
+        def rates(t: float, state: Any) -> tuple[float, float]:
+            x, v = map(float, state)
+            return v, force(t, x, v) - 0.1 * v - x
+
+        return reference_end(Motion(part, self.scene(part), start, duration, rates))
 
     def compiled_distances(self, part: Excitation) -> Iterator[float]:
         scene = Oscillator(

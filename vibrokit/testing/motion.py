@@ -49,7 +49,7 @@ def follow(motions: Iterable[Motion]) -> str:
     """Compare trajectories with SciPy's; return a remark, or raise ConformanceError."""
     worst, left_out = 0.0, 0
     for motion in motions:
-        ended = _reference(motion)
+        ended = reference_end(motion)
         if ended is None:
             left_out += 1
             continue
@@ -73,7 +73,7 @@ def compare(part: Part, duration: float, found: Array, ended: tuple[Array, float
     return distance
 
 
-def _reference(motion: Motion) -> tuple[Array, float] | None:
+def reference_end(motion: Motion) -> tuple[Array, float] | None:
     """The end of a motion by DOP853 and its size; None if it runs away or takes too many steps."""
     evaluations = 0
 
