@@ -19,7 +19,7 @@ def restitution(owner: str, value: Any) -> float:
     return _RESTITUTION.checked(owner, value)
 
 
-def speed(owner: str, value: Any) -> float:
+def impact_speed(owner: str, value: Any) -> float:
     """Return a speed of impact (m s⁻¹); raise ParameterError if it is not positive."""
     return _SPEED.checked(owner, value)
 

@@ -61,6 +61,39 @@ def test_bounce_as_the_equation_of_motion_says(exponent, side):
         assert speed_after(law, speed, side) == pytest.approx(exact_speed_after(dissipation, speed), rel=1e-6)
 
 
+def test_restitution_at_three_speeds():
+    """Of (1 + a)/(1 − a e) = exp(a (1 + e)) with a = 3/2 c v, for c v = 0.1, 0.2 and 0.5."""
+    law = HuntCrossley(stiffness=50.0, dissipation=0.2)
+    for speed, e in ((0.5, 0.909016), (1.0, 0.832870), (2.5, 0.662962)):
+        assert law.rebound(speed) == pytest.approx(e, abs=6e-7)
+        assert law.rebound(speed) == pytest.approx(exact_speed_after(0.2, speed) / speed, rel=1e-12)
+        again = HuntCrossley.from_restitution(law.rebound(speed), 50.0, speed)
+        assert again.dissipation == pytest.approx(0.2, rel=1e-13)
+    assert HuntCrossley(0.0, 0.2).rebound(1.0) == 0
+
+
+@pytest.mark.parametrize(("e", "speed", "exponent"), [(1.0, 1.0, 1.5), (0.8, 0.5, 1.5), (0.1, 2.0, 2.0)])
+def test_a_mass_comes_back_as_asked(e, speed, exponent):
+    law = HuntCrossley.from_restitution(e, 50.0, speed, exponent)
+    assert (law.stiffness, law.exponent) == (50.0, exponent)
+    assert speed_after(law, speed) == pytest.approx(e * speed, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((0.0, 50.0, 1.0), "e must be a finite number greater than 0 and at most 1, got 0."),
+        ((1.5, 50.0, 1.0), "e must be .* at most 1, got 1.5."),
+        ((0.5, 0.0, 1.0), "stiffness must be a finite number greater than 0, got 0."),
+        ((0.5, 50.0, 0.0), "speed must be a finite number greater than 0, got 0."),
+    ],
+    ids=str,
+)
+def test_what_is_no_restitution_is_refused(arguments, said):
+    with pytest.raises(ParameterError, match=f"HuntCrossley.from_restitution: {said}"):
+        HuntCrossley.from_restitution(*arguments)
+
+
 def test_energy_is_lost_and_more_of_it_at_higher_speed():
     law = HuntCrossley(stiffness=50.0, dissipation=0.5)
     restitution = [speed_after(law, speed) / speed for speed in (0.1, 0.3, 1.0, 3.0)]
