@@ -126,6 +126,29 @@ class TestRest:
         assert Code.STARTS_NEUTRAL not in [finding.code for finding in found.findings]
 
 
+@pytest.mark.slow
+def test_a_motion_beside_a_family():
+    """A mass that is shaken by 12 cos 2πt hammers on both stops, or oscillates by 0.30 m about any place between."""
+    shaken = mass(vk.Harmonic(12.0, 2 * math.pi), barriers=stops(200.0))
+    found = vk.find_structure(shaken, starts=(12, 12), cells=(40, 40), region=((-1.2, 1.2), (-5, 5)), saddles=False)
+    assert [(one.name, one.hits) for one in found.attractors] == [("hammering", {"left": 1, "right": 1})]
+    told = {finding.code: finding.values for finding in found.findings}
+    assert 0 < told[Code.STARTS_NEUTRAL]["count"] < told[Code.STARTS_NEUTRAL]["starts"] == 144
+    assert Code.FOLLOWED_ON not in told
+    assert 0 < told[Code.CELLS_UNSETTLED]["fraction"] < 1 - found.attractors[0].basin_fraction + 1e-12
+
+
+PRESSED = mass(vk.Constant(-1.0), barriers=stops(200.0), noise=vk.WhiteNoise(0.2))
+
+
+@pytest.mark.slow
+def test_energy_of_leaving_a_stop():
+    """2c times the work from rest, at the depth f/k, to the other stop: 2c (1.2 f + f²/2k)."""
+    exact, known = 2 * C * (1.2 + 1 / 400), vk.find_structure(PRESSED, cells=(40, 40))
+    energy = vk.LeastAction(exit=vk.FirstContact("right")).run(PRESSED, known).energies[0]
+    assert energy.value == pytest.approx(exact, rel=1e-9)
+
+
 def test_nodes_of_a_density_where_most_of_the_mass_is_free():
     """The stops are stiffer than free motion, so that nodes are closer there; in the gap they are equally spaced."""
     grid = DensityGrid.of(mass(barriers=stops(200.0)), Region((-0.9, 0.9), (-4, 4)), (181, 40))

@@ -98,13 +98,14 @@ class Search:
 
     def go_on(self, states: Array, wait: int) -> bool:
         """Follow more states; return whether some come to an attractor that was not known."""
-        known, counts, followed = len(self.attractors), (self.diverged, self.stalled), len(states)
+        known, counts, followed = len(self.attractors), (self.diverged, self.stalled, self.neutral), len(states)
         if followed:
             states = self._add_orbits(self._after(states, wait), LONGEST_PERIOD)
         if self.osc.autonomous:
             states = self._add_cycles(states)
         gone, moving = self.diverged - counts[0], len(states) + self.stalled - counts[1]
-        self.diverged, self.stalled = counts
+        followed -= self.neutral - counts[2]  # the starts have told of families
+        self.diverged, self.stalled, self.neutral = counts
         self.beyond = {"followed": followed, "diverged": gone, "moving": moving}
         return len(self.attractors) > known
 
