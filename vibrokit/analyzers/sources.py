@@ -149,8 +149,11 @@ class RelaxationsWithoutMemory(Source):
 
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Iterable[Candidate]:
         """Return those to an equilibrium, for polishing from their states."""
+        white = WithoutMemory(problem)
+        if white.filter is None:
+            return ()
         with stage(self.name, subject=problem.attractor.name, unit=TRAJECTORIES):
-            return tuple(WithoutMemory(problem).candidates(max(pieces_of(problem.scene))))
+            return tuple(white.candidates(max(pieces_of(problem.scene))))
 
 
 class Graph(Source):
