@@ -7,6 +7,8 @@ from typing import Any, ClassVar
 from vibrokit.parts.noise import StationaryNoise
 from vibrokit.parts.parameter import parameter
 
+_WIDEST = 0.5  # damping ratio: a peak as wide as its own frequency is none
+
 
 class FilteredNoise(StationaryNoise):
     """White noise through a resonant band pass, y″ + 2ζω y′ + ω² y = 2ζω √D W″.
@@ -48,3 +50,17 @@ class FilteredNoise(StationaryNoise):
         """One-sided density at an angular frequency."""
         passed = (2 * self.damping_ratio * self.frequency * frequency) ** 2
         return 2 * self.intensity * passed / ((self.frequency**2 - frequency**2) ** 2 + passed)
+
+    def unresolved(self, resolution: float) -> str:
+        """Return why a fit is no narrow band: no peak, or one narrower than the spectrum resolves."""
+        width = 2 * self.damping_ratio * self.frequency
+        if self.damping_ratio > _WIDEST:
+            return (
+                f"the spectrum has no peak: the best one is {width:.3g} rad/s wide; take ColouredNoise or WhiteNoise."
+            )
+        if width < resolution:
+            return (
+                f"the peak at {self.frequency:.4g} rad/s is {width:.2g} rad/s wide, and the record resolves "
+                f"{resolution:.2g}; take one that is {resolution / width:.1f} times as long, or longer."
+            )
+        return ""

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from vibrokit.construction import called
 from vibrokit.parts.formula_part import FormulaPart
 from vibrokit.parts.parameter import parameter
 from vibrokit.parts.part import Part
 from vibrokit.parts.spectral_density import Measured, intensity_of
+
+if TYPE_CHECKING:
+    from vibrokit.measured.noise_fit import NoiseEstimate
 
 
 class NoiseModel(Part):
@@ -59,6 +62,38 @@ class StationaryNoise(NoiseModel):
 
         By arithmetic alone, so that it may be asked for an array of frequencies.
         """
+
+    @classmethod
+    @called
+    def from_record(cls, t: Any, a: Any) -> NoiseEstimate:
+        """Estimate the noise from a record of its force per unit mass, or of the acceleration of the support.
+
+        The model's density is fitted to Welch's estimate of the record's, up to 0.3 of the Nyquist frequency.
+
+        Parameters
+        ----------
+        t : array_like (count,)
+            Times (s), equally spaced, 512 or more.
+        a : array_like (count,)
+            The acceleration (m s⁻²); a force is divided by the mass first.
+
+        Returns
+        -------
+        NoiseEstimate
+            Its `noise`, `standard_errors` and `plot`.
+
+        Raises
+        ------
+        ParameterError
+            The record is too short, not finite or not equally spaced, or does not determine the parameters.
+        """
+        from vibrokit.measured.noise_fit import fitted_noise
+
+        return fitted_noise(cls, t, a)
+
+    def unresolved(self, resolution: float) -> str:
+        """Return why noise fitted to a spectrum of this resolution (s⁻¹) is none that the record shows; "" if it is."""
+        return ""
 
 
 class WhiteNoise(StationaryNoise):

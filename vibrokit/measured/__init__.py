@@ -1,0 +1,1 @@
+"""What is estimated from measured records; array work for parts, which import it late."""
