@@ -32,6 +32,7 @@ from .kernels.fixed_steps import RK4 as RK4
 from .kernels.fixed_steps import RK8 as RK8
 from .kernels.located import FreeFlight as FreeFlight
 from .kernels.located import Order8 as Order8
+from .measured.fourier import PeriodicEstimate as PeriodicEstimate
 from .oscillator import Oscillator as Oscillator
 from .parts.barrier import Barrier as Barrier
 from .parts.chirp import Chirp as Chirp
@@ -55,6 +56,7 @@ from .parts.noise import StateDependentNoise as StateDependentNoise
 from .parts.noise import StationaryNoise as StationaryNoise
 from .parts.noise import WhiteNoise as WhiteNoise
 from .parts.parameter import parameter as parameter
+from .parts.periodic import Periodic as Periodic
 from .parts.pulses import PulseTrain as PulseTrain
 from .parts.spring import CubicSpring as CubicSpring
 from .parts.spring import CustomSpring as CustomSpring

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 from vibrokit.parts.formula import check_parameter_names, in_exponents, read
+from vibrokit.parts.named_constants import NamedConstants
 from vibrokit.parts.parameter import Parameter
 
 
-class FormulaPart:
+class FormulaPart(NamedConstants):
     """Base of the custom parts: a formula as text, and named constants that it may use.
 
-    The constants are parameters: they must be finite, have symbols, are saved in scene files, and can be changed
-    without recompilation. The formula is structural, and so are constants in exponents of what varies: ``k*depth**n``
+    The formula is structural, and so are constants in exponents of what varies: ``k*depth**n``
     with n = 1.5 is treated like ``k*depth**1.5``.
     """
 
@@ -21,8 +21,6 @@ class FormulaPart:
     formula_name: ClassVar[str] = "formula"
 
     formula: str
-    constants: tuple[tuple[str, Any], ...]
-    _declared: ClassVar[tuple[Parameter, ...]]
 
     def _read(self, formula: str, constants: Mapping[str, Any]) -> None:
         """Check formula and constants and store them."""
@@ -37,7 +35,7 @@ class FormulaPart:
 
     def _own(self) -> tuple[Parameter, ...]:
         """Parameters that the class declares besides formula and constants."""
-        return tuple(declared for declared in self._declared if declared.attribute not in ("formula", "constants"))
+        return tuple(declared for declared in super()._own() if declared.attribute != "formula")
 
     def declared(self) -> tuple[Parameter, ...]:
         """Parameters of this part: its own, the formula (structural), then each constant."""
@@ -46,17 +44,10 @@ class FormulaPart:
         constants = (Parameter(name, name, name, "", structural=name in shaping) for name, _ in self.constants)
         return (*self._own(), formula, *constants)
 
-    def _value(self, declared: Parameter) -> Any:
-        constants = dict(self.constants)
-        return constants[declared.name] if declared.name in constants else getattr(self, declared.attribute)
-
     def twin(self, values: Mapping[str, Any]) -> Self:
         """Return an unchecked copy whose constants are `values` by name."""
-        twin = object.__new__(type(self))
-        for declared in self._own():
-            object.__setattr__(twin, declared.attribute, values[declared.name])
+        twin = super().twin(values)
         object.__setattr__(twin, "formula", self.formula)
-        object.__setattr__(twin, "constants", tuple((name, values[name]) for name, _ in self.constants))
         return twin
 
     def _evaluate(self, *arguments: Any) -> Any:

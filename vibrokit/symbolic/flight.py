@@ -104,7 +104,9 @@ def sinusoids(model: Equations) -> list[tuple[sympy.Expr, sympy.Expr, sympy.Expr
     A mean is one of frequency 0.
     """
     time = model.time
-    forcing = sympy.expand(sympy.fu(sympy.expand(model.forcing))) if model.forcing.has(sympy.Pow) else model.forcing
+    forcing = model.forcing
+    if any(power.has(time) for power in forcing.atoms(sympy.Pow)):
+        forcing = sympy.expand(sympy.fu(sympy.expand(forcing)))
     waves = []
     for term in sympy.Add.make_args(sympy.expand(forcing)):
         if term == 0:

@@ -14,6 +14,7 @@ from vibrokit.parts.contact import CustomLaw
 from vibrokit.parts.noise import StateDependentNoise
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.part import Part
+from vibrokit.parts.periodic import Periodic
 from vibrokit.parts.spring import CustomSpring
 from vibrokit.testing.report import ConformanceError
 
@@ -22,6 +23,7 @@ _ATTEMPTS = 100
 
 # Instances of classes with a formula, which cannot be drawn at random.
 REPRESENTATIVES: dict[type[Part], Callable[[], Part]] = {
+    Periodic: lambda: Periodic(0.9, 0.1, c_1=0.2, s_1=-0.1, s_3=0.05),
     CustomLaw: lambda: CustomLaw("k*depth**1.5*(1 + c*rate) + k*tanh(depth)/3", k=50.0, c=0.1),
     CustomSpring: lambda: CustomSpring("x + e*x**5 + d*v**3 + sin(x)/2", e=0.2, d=0.1),
     StateDependentNoise: lambda: StateDependentNoise(1e-3, "sqrt(1 + c*x**2)*exp(-v**2/8)", c=0.5),
