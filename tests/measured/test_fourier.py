@@ -75,6 +75,18 @@ def test_a_linear_mass_answers_each_harmonic():
     assert part.frequencies == pytest.approx(0.6 * np.array([1, 2, 7]))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("stepper", [None, vk.FreeFlight(1e-12)])
+def test_a_series_of_many_harmonics_is_followed(stepper):
+    rates, sizes = 0.6 * np.arange(1, 31), 0.3 / np.arange(1, 31) ** 2
+    part = vk.Periodic(0.6, **{f"c_{k}": size for k, size in enumerate(sizes, 1)})
+    osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, excitations=[part])
+    responses = sizes / (1 - rates**2 + 0.2j * rates)
+    steady = [responses.sum().real, (1j * rates * responses).sum().real]
+    path = osc.trajectory(steady, periods=1, samples=2, stepper=stepper)
+    np.testing.assert_allclose(path.states[-1], steady, atol=1e-8)
+
+
 def test_coefficients_in_a_scene_file_and_by_path(tmp_path):
     part = vk.Periodic(0.6, s_10=-0.1, c_2=0.05)
     assert list(part.parameters) == ["frequency", "mean", "c_2", "s_10"]

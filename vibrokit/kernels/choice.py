@@ -24,6 +24,7 @@ _STEPS, _FEWEST_STEPS = 256, 32  # in an interval of a quarter of a free oscilla
 _MOST_STEPS, _MOST_NOISY_STEPS = 1024, 65536  # in an interval of one free oscillation or less
 _PER_TURN = 64  # steps in one free oscillation
 _TOO_FEW = 8  # steps in one contact; with fewer, RK4 was observed to create spurious steady states
+_MOST_WAVES = 16  # for which the Taylor series of a free flight is worth its terms
 _PER_NOISY_PULSE = 128  # that begins or ends with a jump
 _PER_DECAY = 4  # steps in which a state of the noise decays by e
 _PER_PULSE, _PER_RISE, _PER_WAVE = 16, 4, 16  # steps in a pulse of an excitation, where it crosses its range, in a wave
@@ -143,7 +144,8 @@ def _power_of_two(needed: float) -> int:
 def _flies(scene: Scene, flow: Flow) -> bool:
     """Whether all parts are built-in ones that FreeFlight accepts; decided without their formulas, for speed."""
     linear = scene.friction is None and (scene.spring is None or type(scene.spring) is LinearSpring)
-    sinusoids = all(part.frequencies is not None for part in scene.excitations)
+    waves = [part.frequencies for part in scene.excitations]
+    sinusoids = None not in waves and sum(len(one or ()) for one in waves) <= _MOST_WAVES
     if scene.noise is None or type(scene.noise) is WhiteNoise:
         return linear and sinusoids
     with_noise = flow.has_momenta or flow.has_covariance  # the amplitude is among what is integrated

@@ -12,6 +12,7 @@ from vibrokit.symbolic.flow import ACTION, FORCING, FlowEquations
 from vibrokit.symbolic.printer import SourcePrinter, unpack
 
 ORDER = 22
+_MOST_NESTED = 16  # parentheses, of which Python reads 200
 
 
 class FlightWriter:
@@ -55,10 +56,14 @@ class FlightWriter:
         # A covariance decays at the sum of two rates of the motion.
         pairs = [pair for pair in zip(self.variables, self.rates, strict=True) if pair[0] in self.covariances]
         bounds += [sympy.Abs(own) for own in dict.fromkeys(sympy.diff(rate, v) for v, rate in pairs) if own != 0]
-        text, *others = map(SourcePrinter().doprint, bounds)
-        for other in others:
+        text, *others = map(SourcePrinter().doprint, dict.fromkeys(bounds))
+        lines = unpack(bounds, places)
+        for place, other in enumerate(others, 1):
             text = f"max({text}, {other})"
-        lines = [*unpack(bounds, places), f"    return {text}", ""]
+            if place % _MOST_NESTED == 0:
+                lines.append(f"    fastest = {text}")
+                text = "fastest"
+        lines += [f"    return {text}", ""]
         return "\n".join(["def flight_rate(theta):", *lines])
 
     def _taylor(self, places: dict[sympy.Symbol, int]) -> str:
