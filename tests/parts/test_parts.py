@@ -11,7 +11,7 @@ import pytest
 import sympy
 
 import vibrokit as vk
-from vibrokit.errors import FormulaError, ParameterError, SceneError, VibrokitError
+from vibrokit.errors import ArgumentError, FormulaError, ParameterError, SceneError, VibrokitError
 from vibrokit.parts.part import Part
 
 PARTS = {
@@ -259,6 +259,16 @@ class TestOwnParts:
         body = {"__annotations__": {name: float}, "formula": lambda self: 0}
         with pytest.raises(TypeError, match=f"the field '{name}' would hide"):
             type("Hiding", (vk.ContactLaw,), body)
+
+    def test_a_default_before_a_parameter_without_one_is_refused(self):
+        with pytest.raises(ArgumentError, match=r"Late cannot become a dataclass \(.*'stiffness'.*default after those"):
+
+            class Late(vk.Spring):
+                offset: float = vk.parameter("d", "m", default=0.0)
+                stiffness: float = vk.parameter("k", "s^-2")
+
+                def force(self, x, v):
+                    return self.stiffness * (x - self.offset)
 
     def test_a_structural_field_stays_a_number_in_the_twin(self):
         class Power(vk.ContactLaw):

@@ -40,7 +40,13 @@ class Part(ABC, metaclass=Constructed):
                     f"{cls.__name__} inherits from {base.__name__}, which is a concrete part and final; inherit from "
                     f"{kind} and write the whole formula."
                 )
-        dataclasses.dataclass(frozen=True, repr=False)(cls)
+        try:
+            dataclasses.dataclass(frozen=True, repr=False)(cls)
+        except TypeError as error:
+            raise ArgumentError(
+                f"{cls.__name__} cannot become a dataclass ({error}); declare parameters with a default after those "
+                "without one."
+            ) from error
         cls._check_fields()
         del cls.__setattr__, cls.__delattr__  # Part has its own; an explicit decorator may add them again
         cls._declared = declared_parameters(cls)
