@@ -47,5 +47,5 @@ def mirrored(problem: ExitProblem, known: Analysis, graph: GraphSolution | None)
         else each
         for each in found.findings
     ]
-    data = found.data if graph is None else graph.dataset(mirrored=True)
+    data = found.data if graph is None else graph.dataset(mirrored_after=mirror.later)
     return dataclasses.replace(found, estimates=estimates, data=data, findings=tuple(findings))

@@ -30,15 +30,15 @@ class LinearResponse:
     left: float  # largest forced displacements from the rest (m), not negative
     right: float
     speed: float  # largest of the forced motion (m s⁻¹)
-    noise: float  # standard deviation of x by noise (m); NaN without noise or where it is not bounded
+    noise: float  # standard deviation of x by noise (m); NaN without noise, and where it is not bounded or varies
 
 
 def linear_response(osc: Oscillator) -> LinearResponse | None:
     """Return the linear response about the rest nearest to x = 0; None if there is no stable rest without contact.
 
-    Rests that are clear of the stops come first.
+    Rests that are clear of the stops come first. Forces that vary in time with the state have their mean.
     """
-    found, mean = _tones(osc)
+    _, mean = _tones(osc)
     drift, extra = drift_at(osc.model), len(osc.model.state) - 2
 
     def force(x: float) -> float:
@@ -61,20 +61,20 @@ def linear_response(osc: Oscillator) -> LinearResponse | None:
             continue
         rates = np.linalg.eigvals(matrix)
         if rates.real.max() <= _UNDAMPED * np.abs(rates).max():
-            left, right, speed = _forced(osc, found, float(-matrix[1, 0]), float(-matrix[1, 1]))
-            noise = _noise(osc, matrix, state)
+            left, right, speed = _forced(osc, _tones(osc, rest)[0], float(-matrix[1, 0]), float(-matrix[1, 1]))
+            noise = math.nan if osc.model.in_time.modulated else _noise(osc, matrix, state)
             return LinearResponse(rest, float(-matrix[1, 0]), float(-matrix[1, 1]), left, right, speed, noise)
     return None
 
 
-def _tones(osc: Oscillator) -> tuple[list[Tone], float]:
-    """Tones of the excitations, and the sum of their means without constants."""
+def _tones(osc: Oscillator, rest: float = 0.0) -> tuple[list[Tone], float]:
+    """Tones of the excitations at a rest, and the sum of the means of those of time alone, without constants."""
     found, mean = list[Tone](), 0.0
     for index, part in enumerate(osc.excitations):
         if part.period is not None and math.isfinite(part.period):
             # At most 63 tones of each, none below 1e-9 of the largest.
-            own, more = tones(excitation_of(osc.model, index), part.period, 63, 1e-9)
-            found, mean = found + more, mean + own
+            own, more = tones(excitation_of(osc.model, index, rest), part.period, 63, 1e-9)
+            found, mean = found + more, mean + (0.0 if part.depends_on_state else own)
     return found, mean
 
 
@@ -122,7 +122,12 @@ def _noise(osc: Oscillator, matrix: Array, state: list[float]) -> float:
 
 
 def departure(osc: Oscillator, response: LinearResponse, reach: float, speed: float) -> float:
-    """Return how far forces depart from the linear ones at a distance (m) and a speed (m s⁻¹), as a part of these."""
+    """Return how far forces depart from the linear ones at a distance (m) and a speed (m s⁻¹), as a part of these.
+
+    It is infinite for forces that vary in time with the state: no linear response is that of a constant system then.
+    """
+    if osc.model.in_time.modulated:
+        return math.inf
     drift, extra = drift_at(osc.model), [0.0] * (len(osc.model.state) - 2)
     at_rest, largest = drift([response.rest, 0.0, *extra])[1], 0.0
     for x, v in ((reach, 0.0), (-reach, 0.0), (0.0, speed), (0.0, -speed)):

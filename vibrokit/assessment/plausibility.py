@@ -137,7 +137,8 @@ def _frequencies(osc: Oscillator, response: LinearResponse | None) -> Iterator[R
     }
     yield from (Row(Measure.FREQUENCY_RATIO, ratio, path) for path, ratio in ratios.items())
     if ratios:
-        yield Row(Measure.AMPLITUDE, max(response.left, response.right))
+        if not osc.model.in_time.modulated:
+            yield Row(Measure.AMPLITUDE, max(response.left, response.right))
         yield from _odd_frequency(min(ratios.values(), key=lambda ratio: abs(math.log(ratio))))
 
 

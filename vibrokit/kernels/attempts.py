@@ -78,9 +78,9 @@ class AttemptWriter:
         lines += [f"    for lane in range({LANES}):"]
         lines += [f"        {name} = {self._at('POINT', row)}" for row, name in names]
         lines += self._on_course() if self._stops else []
-        lines += ["        f = forcing(_now, theta)"] * self._text.forced
+        lines += [f"        {', '.join(self._text.functions)} = forcing(_now, theta)"] * self._text.forced
         pushing = [f"{self._at('PUSHES', -stop)} > 0.5" for stop in range(self._stops)]
-        values = [*self._text.variables, *["f"] * self._text.forced, *pushing, *self._text.parameters]
+        values = [*self._text.variables, *self._text.functions, *pushing, *self._text.parameters]
         slopes = [f"_slope{row}" for row in range(self._count)]
         lines += [f"        {', '.join(slopes)} = rates({', '.join(values)})"]
         if self._text.gauges:

@@ -70,7 +70,7 @@ class FixedSteps(Stepper):
                 f"{name} steps across a place where the slope of a force is infinite, as that of the root "
                 f"of the depth at first touch, and there the {what} are far off; use Order8, which shortens its steps."
             )
-        sizes = f"{len(self.nodes)}, {self.slopes * len(text.variables)}"
+        sizes = f"{len(self.nodes) * max(1, len(text.functions))}, {self.slopes * len(text.variables)}"
         facts = f"LANES = {lanes_of(text)}\nFACTS = (LANES, FORCED, {sizes})\nWALLS = ()  # steps go across contacts\n"
         step = [tabulation(text, self.nodes), text.derivative, text.crossed, *self.step_part(text)]
         # The laws are compiled only if contact times are needed.

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 _FEW_EQUATIONS = 8
 _ROOT_THIRD = 1 / math.sqrt(3)
-_FORCES = ("f0", "f1", "f2")
 CLASSICAL_NODES = (0.0, 0.5, 1.0)
 # `z` has a row of lanes for each variable. `forces` has the forcing at the nodes of each step, the same for all lanes
 # because they share the phase; `normals` has two standard normals for each lane, in two rows, for a single step; both
@@ -32,7 +31,7 @@ def step_function(text: SceneText, step: Sequence[str], nodes: int) -> str:
     """Function `step_lanes`, which takes steps of every lane, from the lines of one step."""
     lines = [*_STEP]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
-    lines += ["    for step in range(steps):", *[f"        _node = {nodes}*step"] * text.forced]
+    lines += ["    for step in range(steps):", *[f"        _node = {nodes * len(text.functions)}*step"] * text.forced]
     return "\n".join([*lines, *(f"    {line}" for line in step), ""])
 
 
@@ -58,16 +57,17 @@ def classical_step(text: SceneText) -> list[str]:
     noisy = bool(text.amplitude)
     driven = names[text.states - 1]
     start = [f"z[{row * lanes} + lane]" for row in range(text.states)]
-    lines = ["    f0, f1, f2 = forces[_node], forces[_node + 1], forces[_node + 2]"] if text.forced else []
+    at_nodes = [_named(f"f{node}", text) for node in range(len(CLASSICAL_NODES))]
+    lines = [_read([name for names in at_nodes for name in names])] if text.forced else []
     lines += ["    _half = 0.5*sqrt(h)"] if noisy else []
     lines += ["    for lane in range(LANES):"]
     lines += [f"        {name} = z[{row * lanes} + lane]" for row, name in enumerate(names)]
     lines += _kicks(driven, text) if noisy else []
     for stage, (factor, before) in enumerate(_STAGES, start=1):
         point = [f"{name} + {factor}{before}{name}" if before else name for name in names]
-        force = [_FORCES[stage // 2]] if text.forced else []
         targets = ", ".join(f"k{stage}_{name}" for name in names)
-        lines.append(f"        {targets} = derivative({', '.join([*point, *force, *text.parameters])})")
+        values = [*point, *at_nodes[stage // 2], *text.parameters]
+        lines.append(f"        {targets} = derivative({', '.join(values)})")
         lines += _ended(text, start, point, f"k{stage}_{names[0]}") if before or noisy else []
     for row, name in enumerate(names):
         slopes = f"k1_{name} + 2.0*(k2_{name} + k3_{name}) + k4_{name}"
@@ -101,10 +101,11 @@ def staged_step(text: SceneText) -> list[str]:
         if not few:
             lines += [f"    for number in range({size}):"]
             lines += [f"        {number(STAGES)} = z[number]{_combined(weights, number)}"]
-        lines += [f"    force = forces[_node + {stage}]"] * text.forced
+        force = _named("force", text)
+        lines += [_read(force, stage * len(force))] if force else []
         lines += ["    for lane in range(LANES):"]
         lines += [f"        {', '.join(at(1 + stage, row) for row in rows)} = \\"]
-        lines += [f"            derivative({', '.join([*point, *['force'] * text.forced, *text.parameters])})"]
+        lines += [f"            derivative({', '.join([*point, *force, *text.parameters])})"]
         lines += _ended(text, start, point, at(1 + stage, 0)) if stage else []
     if text.gauges:
         last = [moved(RESULT, row) for row in range(text.states)]
@@ -116,6 +117,19 @@ def _combined(weights: NDArray[np.float64], slope: Callable[[int], str]) -> str:
     """Text that adds the weighted slopes of a step, if there are any; `slope` gives the text of that of a stage."""
     terms = [f"{float(weight)!r}*{slope(stage)}" for stage, weight in enumerate(weights) if weight]
     return f" + h*({' + '.join(terms)})" if terms else ""
+
+
+def _named(name: str, text: SceneText) -> list[str]:
+    """Names of the functions of time at a node."""
+    several = len(text.functions) > 1
+    return [f"{name}_{place}" if several else name for place in range(len(text.functions))]
+
+
+def _read(names: Sequence[str], first: int | None = None) -> str:
+    """A line that reads values of the table, from that of a step or from a later one on."""
+    places = [f"_node + {place}" for place in range(first or 0, (first or 0) + len(names))]
+    values = (f"forces[{place}]" for place in (["_node", *places[1:]] if first is None else places))
+    return f"    {', '.join(names)} = {', '.join(values)}"
 
 
 def _kicks(driven: str, text: SceneText) -> list[str]:
@@ -130,12 +144,12 @@ def _kicks(driven: str, text: SceneText) -> list[str]:
 
 
 def tabulation(text: SceneText, nodes: Sequence[float]) -> str:
-    """Function `tabulate(start, h, steps, theta, table)`: the forcing at the nodes of steps; empty without."""
+    """Function `tabulate(start, h, steps, theta, table)`: functions of time at the nodes of steps; empty without."""
     if not text.forced:
         return ""
     lines = ["def tabulate(start, h, steps, theta, table):", "    for step in range(steps):"]
-    lines += [
-        f"        table[{len(nodes)}*step + {place}] = forcing(start + h*(step + {node!r}), theta)"
-        for place, node in enumerate(nodes)
-    ]
+    count = len(text.functions)
+    for place, node in enumerate(nodes):
+        targets = (f"table[{len(nodes) * count}*step + {place * count + k}]" for k in range(count))
+        lines.append(f"        {', '.join(targets)} = forcing(start + h*(step + {node!r}), theta)")
     return "\n".join([*lines, ""])

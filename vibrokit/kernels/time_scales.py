@@ -24,6 +24,7 @@ from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import LinearSpring
 from vibrokit.symbolic.flow_kind import Flow
 
+_PLACE = (0.8, 0.6)  # (x, v) at which a force that depends on them is sampled
 _SAMPLES = 2**16  # of a period of an excitation; the narrowest pulse that is seen lasts two of them
 _TURNS = 128  # free oscillations from t = 0 in which an excitation that never repeats is sampled
 _WIDTHS = tuple(dict.fromkeys(int(2 ** (step / 2)) for step in range(2, 29)))  # of pulses, up to a quarter of a period
@@ -63,7 +64,7 @@ def _changes(part: Excitation, longest: float) -> Changes:
     repeats, window = math.isinf(longest), min(part.period or math.inf, longest)
     field = VectorField(Scene(natural_frequency=1.0, damping_ratio=0.0, excitations=(part,)))
     spacing = window / _SAMPLES
-    force = np.nan_to_num([field.excitation(0, spacing * sample) for sample in range(_SAMPLES)])
+    force = np.nan_to_num([field.excitation(0, spacing * sample, _PLACE) for sample in range(_SAMPLES)])
     size = float(np.ptp(force))
     if not size > 0.0:
         return Changes(math.inf, math.inf)
@@ -168,11 +169,16 @@ def _typical_motion(scene: Scene, module: types.ModuleType, theta: list[float]) 
 
 
 def _harmonics(scene: Scene, module: types.ModuleType, theta: list[float]) -> tuple[Array, Array]:
-    """Angular frequencies of the forcing over one interval, and their amplitudes."""
+    """Angular frequencies of the forcing at x = 0 over one interval, and their amplitudes."""
     if not module.FORCED:
         return np.zeros(0), np.zeros(0)
     unit, samples = scene.time_unit, 128
-    values = np.array([module.forcing.py_func(unit * sample / samples, theta) for sample in range(samples)])
+    times = [unit * sample / samples for sample in range(samples)]
+    if scene.depends_on_state:
+        field, parts = VectorField(scene), range(len(scene.excitations))
+        values = np.array([sum(field.excitation(index, time) for index in parts) for time in times])
+    else:
+        values = np.array([module.forcing.py_func(time, theta) for time in times])
     sizes = np.asarray(np.abs(np.fft.rfft(values)) * (2.0 / samples), dtype=np.float64)
     sizes[0] /= 2.0
     sizes[sizes < 1e-9 * sizes.max()] = 0.0  # rounding, which a resonance would amplify

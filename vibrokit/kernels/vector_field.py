@@ -35,11 +35,11 @@ class _Rates(Emitter):
 def _rates_function(text: SceneText) -> str:
     """Function `rates(t, z, theta, out)`: the right-hand sides of states z (count, EQUATIONS) at times t (count,)."""
     places = range(len(text.variables))
-    values = [*(f"z[lane, {place}]" for place in places), *(["f"] if text.forced else []), *text.parameters]
+    values = [*(f"z[lane, {place}]" for place in places), *text.functions, *text.parameters]
     lines = ["@njit(**OPTIONS)", "def rates(t, z, theta, out):"]
     lines += [f"    {name} = theta[{place}]" for name, place in text.parameters.items()]
     lines += ["    for lane in range(z.shape[0]):"]
-    lines += ["        f = forcing(t[lane], theta)"] if text.forced else []
+    lines += [f"        {', '.join(text.functions)} = forcing(t[lane], theta)"] * text.forced
     lines += [f"        {', '.join(f'out[lane, {place}]' for place in places)} = derivative({', '.join(values)})"]
     return "\n".join([*lines, ""])
 
@@ -73,9 +73,10 @@ class VectorField:
         points = np.concatenate([states, momenta, np.zeros((*np.shape(states)[:-1], 1))], axis=-1)
         return self._rates(Flow.HAMILTONIAN, points, time)[..., :-1]
 
-    def excitation(self, index: int, time: float) -> float:
-        """Return the force of one excitation (m s⁻²)."""
-        return float(self._module(Flow.STATE_VARIATIONAL).excitation(index, time, self._theta))
+    def excitation(self, index: int, time: float, place: tuple[float, float] = (0.0, 0.0)) -> float:
+        """Return the force of one excitation (m s⁻²) at a place (x, v), on which most do not depend."""
+        state = place if self.scene.depends_on_state else ()
+        return float(self._module(Flow.STATE_VARIATIONAL).excitation(index, time, *state, self._theta))
 
     def _variational(self, states: Array, time: float | Array) -> Array:
         """b, and ∂b/∂q row by row: the rates of the variational equations where the matrix is the identity."""

@@ -1,27 +1,52 @@
-"""Excitations: forces that depend on time only."""
+"""Excitations: forces that depend on time."""
 
 from __future__ import annotations
 
+import inspect
 import math
 from abc import abstractmethod
 from typing import Any, ClassVar
 
+from vibrokit.errors import ArgumentError
 from vibrokit.parts.functions import cos
 from vibrokit.parts.parameter import parameter
 from vibrokit.parts.part import Part
 
+_TIME, _TIME_AND_STATE = ("t",), ("t", "x", "v")
+
 
 class Excitation(Part):
-    """Force per unit mass that depends on time only. Abstract."""
+    """Force per unit mass that depends on time, and may depend on the state. Abstract."""
 
     variables: ClassVar[tuple[str, ...]] = ("t",)
+    """Names of the arguments of the force: those of the method of the class."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        given = tuple(inspect.signature(cls.force).parameters)[1:]
+        if "force" in vars(cls) and given not in (_TIME, _TIME_AND_STATE):
+            raise ArgumentError(
+                f"{cls.__name__}.force has the arguments ({', '.join(given)}); an excitation has force(self, t), or "
+                "force(self, t, x, v) if it depends on the state."
+            )
+        if "force" in vars(cls):
+            cls.variables = given
+
+    @property
+    def depends_on_state(self) -> bool:
+        """Whether the force depends on the displacement and the velocity of the mass."""
+        return self.variables == _TIME_AND_STATE
 
     @abstractmethod
-    def force(self, t: Any) -> Any:
+    def force(self, t: Any, *args: Any, **kwargs: Any) -> Any:
         """Force (m s⁻²) at time `t` (s), as a SymPy expression.
 
-        It may jump, and have pulses as short as 1/30 000 of its period; one that never repeats is searched for pulses
-        from t = 0 to 128 free oscillations.
+        Write ``force(self, t)``, or ``force(self, t, x, v)`` for a force that depends on the displacement `x` (m) and
+        the velocity `v` (m s⁻¹) too, as under a stiffness that varies. In the state it must be smooth, and have values
+        everywhere.
+
+        In time it may jump, and have pulses as short as 1/30 000 of its period; one that never repeats is searched for
+        pulses from t = 0 to 128 free oscillations.
         """
 
     @property
@@ -31,7 +56,7 @@ class Excitation(Part):
 
     @property
     def frequencies(self) -> tuple[float, ...] | None:
-        """Angular frequencies (s⁻¹) of a force that is a sum of sinusoids and a constant; None for any other force."""
+        """Angular frequencies (s⁻¹) of a force that is, at any state, sinusoids and a constant; None for any other."""
         return None
 
 

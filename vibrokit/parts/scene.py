@@ -217,6 +217,11 @@ class Scene(OwnNumbers):
         return reference_frequency(self)
 
     @property
+    def depends_on_state(self) -> bool:
+        """Whether the force of an excitation depends on the state."""
+        return any(part.depends_on_state for part in self.excitations)
+
+    @property
     def section_interval(self) -> float:
         """Time between sections (s): the common period, or 2π/ω_n for an autonomous scene."""
         return self.period or 2 * math.pi / self.reference_frequency

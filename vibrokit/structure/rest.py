@@ -6,7 +6,7 @@ Exits lead over the tops, however weak the forces of a scene are.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
@@ -20,32 +20,47 @@ from vibrokit.structure.along_x import intervals_within, states_at
 from vibrokit.structure.one_variable import bracketed_roots, tones
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_TIMES, _MOST_TIMES = 64, 1024  # in the shortest period of a force, whose mean is exact for 63 harmonics; in all
 _PLACES = 1024  # in a range of x between borders, at which the force is compared with 0
 
 Array = NDArray[np.float64]
 
 
 class SteadyForce:
-    """The force on the mass (m s⁻²) without the periodic part of the excitations."""
+    """The force on the mass (m s⁻²) without the periodic part of the excitations.
+
+    Of forces that vary in time with the state it has the mean over their common period.
+    """
 
     def __init__(self, osc: Oscillator) -> None:
         self.osc, self.field = osc, VectorField(osc)
-        periods = {i: part.period for i, part in enumerate(osc.excitations) if part.period is not None}
-        now = sum(self.field.excitation(index, 0.0) for index in periods)
+        self._times = _times_over(osc)
+        periods = {
+            i: part.period
+            for i, part in enumerate(osc.excitations)
+            if part.period is not None and not part.depends_on_state
+        }
+        now = sum(np.mean([self.field.excitation(index, time) for time in self._times]) for index in periods)
         finite = ((partial(self.field.excitation, i), period) for i, period in periods.items() if math.isfinite(period))
         self._periodic = now - sum(tones(force, period, 1, 1.0)[0] for force, period in finite)
 
     def __call__(self, states: Array) -> Array:
         """Return the force at states (…, 2)."""
         with np.errstate(all="ignore"):  # a force may be singular
-            rates: Array = self.field.rate(states_at(self.osc, states))[..., 1] - self._periodic
+            rates = self._mean(self.field.rate, states)[..., 1] - self._periodic
         return rates
 
     def slope(self, states: Array) -> Array:
         """Return the derivatives of the force by x and v at states (…, 2), shape (…, 2)."""
         with np.errstate(all="ignore"):
-            derivatives: Array = self.field.jacobian(states_at(self.osc, states))[..., 1, :2]
+            derivatives = self._mean(self.field.jacobian, states)[..., 1, :2]
         return derivatives
+
+    def _mean(self, function: Callable[[Array, Array], Array], states: Array) -> Array:
+        """The mean over the times of a function of states and times."""
+        many = np.broadcast_to(states_at(self.osc, states), (len(self._times), *states.shape))
+        times = self._times.reshape(-1, *[1] * (states.ndim - 1))
+        return np.asarray(function(many, times).mean(axis=0))
 
     def at_rest(self, places: Array) -> Array:
         """Return the force at rest at places (…)."""
@@ -93,6 +108,20 @@ class SteadyForce:
         potential = np.concatenate([[0.0], -np.cumsum(self.work(places)[1])])
         speed = math.sqrt(2 * float(max(potential[0], potential[-1]) - potential.min()))
         return float(f"{speed:.6g}")  # tops that are equally high are so in spite of rounding
+
+
+def _times_over(osc: Oscillator) -> Array:
+    """Times (s) whose mean is that of the forces that vary periodically with the state; 0 without any."""
+    varying = tuple(
+        part
+        for part in osc.excitations
+        if part.depends_on_state and part.period is not None and math.isfinite(part.period)
+    )
+    if not varying:
+        return np.zeros(1)
+    period = osc.replace(excitations=varying).section_interval
+    count = min(_MOST_TIMES, _TIMES * round(period / min(part.period or math.inf for part in varying)))
+    return period * np.arange(count) / count
 
 
 class Top(NamedTuple):

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 
 import sympy
 
-from vibrokit.errors import DerivationError
 from vibrokit.parts.friction import Friction
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import Spring
 from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact, refuse_steep_touch
+from vibrokit.symbolic.excitations import excitation_force
+from vibrokit.symbolic.forcing import Forcing, forcing_of
 from vibrokit.symbolic.formulas import derived_formula, derived_rates
 from vibrokit.symbolic.jumps import refuse_jumps
 from vibrokit.symbolic.removable import without_removable
 from vibrokit.symbolic.roughness import Roughness, refuse_rough, roughness_of
 from vibrokit.symbolic.symbols import parameter_symbols, state_symbols
-
-_SHARES = (0.0341, 0.2163, 0.4527, 0.6194, 0.8812)  # of a period, where a pulse seldom begins or ends
-_SAME = 1e-6  # of the largest force: a period with seven digits repeats
 
 
 class Equations:
@@ -76,11 +73,10 @@ class Equations:
 
     @cached_property
     def smooth_force(self) -> sympy.Expr:
-        """Acceleration without stops and without time-dependent excitations."""
+        """Acceleration without stops and without forces that vary in time."""
         extra = self.state[2:]
-        constant = sum((f for f in self.excitations if self.time not in f.free_symbols), sympy.Integer(0))
         push = self._noise_formula("force", tuple(extra)) if extra else 0
-        return -self._own_damping - self._own_spring - sum(self._forces_of_state.values()) + constant + push
+        return -self._own_damping - self._own_spring - sum(self._forces_of_state.values()) + self.in_time.steady + push
 
     @property
     def _own_frequency(self) -> sympy.Expr:
@@ -135,37 +131,22 @@ class Equations:
 
     @cached_property
     def excitations(self) -> tuple[sympy.Expr, ...]:
-        """Force of each excitation as an expression in time."""
-        forces = []
-        for index, part in enumerate(self.scene.excitations):
-            forces.append(derived_formula(part, "force", self._symbols_of(f"excitations.{index}"), (self.time,)))
-            if part.period is None and self.time in forces[-1].free_symbols:
-                raise DerivationError(
-                    f"{type(part).__name__}.period is None, which means a constant, but its force depends on time; "
-                    "return the period, or math.inf if it never repeats."
-                )
-            if part.period is not None and math.isfinite(part.period):
-                self._check_repeats(type(part).__name__, part.period, forces[-1])
-        return tuple(forces)
-
-    def _check_repeats(self, name: str, period: float, force: sympy.Expr) -> None:
-        """Refuse an excitation that does not repeat after its period, as with 1/f where 2π/ω is meant."""
-        force = force.subs(self.numbers)
-
-        def at(share: float) -> complex:
-            return complex(force.subs(self.time, period * share))
-
-        change = max(abs(at(share + 1) - at(share)) for share in _SHARES)
-        if change > _SAME * max(abs(at(share)) for share in _SHARES):
-            raise DerivationError(
-                f"{name}.period is {period:.10g}, but its force changes by {change:.3g} from one "
-                "period to the next; return a period of the force, or math.inf if it never repeats."
-            )
+        """Force of each excitation as an expression in the time, and in x and v where it depends on them."""
+        natural, plane = self.scene.reference_frequency, self.state[:2]
+        return tuple(
+            excitation_force(part, self._symbols_of(f"excitations.{index}"), self.time, plane, natural)
+            for index, part in enumerate(self.scene.excitations)
+        )
 
     @cached_property
+    def in_time(self) -> Forcing:
+        """The forces of the excitations, split by what they depend on."""
+        return forcing_of(self.excitations, self.time, self.state)
+
+    @property
     def forcing(self) -> sympy.Expr:
-        """Sum of the excitations that depend on time."""
-        return sum((f for f in self.excitations if self.time in f.free_symbols), sympy.Integer(0))
+        """Sum of the forces that vary in time."""
+        return self.in_time.varying
 
     def drift_with(self, forcing: sympy.Expr, contacts: tuple[sympy.Expr, ...]) -> sympy.Matrix:
         """Drift b for a given forcing and given forces of the stops."""

@@ -8,7 +8,8 @@ import sympy
 
 from vibrokit.errors import StepperError
 from vibrokit.symbolic.equations import Equations
-from vibrokit.symbolic.flow import ACTION, FORCING, FlowEquations
+from vibrokit.symbolic.flow import ACTION, FlowEquations
+from vibrokit.symbolic.forcing import FORCING
 from vibrokit.symbolic.printer import SourcePrinter, unpack
 
 ORDER = 22
@@ -24,6 +25,11 @@ class FlightWriter:
     """
 
     def __init__(self, model: Equations, equations: FlowEquations) -> None:
+        if model.in_time.modulated:
+            raise StepperError(
+                "FreeFlight needs linear motion of constant coefficients between the stops, but a force varies in time "
+                f"with the state, as {model.in_time.varying}; use Order8 or RK4."
+            )
         self.model = model
         self.variables, self.covariances = equations.variables, equations.covariances
         no_contact = dict.fromkeys(equations.contacts, sympy.Integer(0))

@@ -11,8 +11,8 @@ from vibrokit.parts.scene import Scene
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact
 from vibrokit.symbolic.equations import Equations
 from vibrokit.symbolic.flow_kind import Flow
+from vibrokit.symbolic.forcing import Forcing
 
-FORCING = sympy.Symbol("f", real=True)
 ACTION = sympy.Symbol("S", real=True)
 
 
@@ -21,7 +21,7 @@ class FlowEquations:
     """Rates of a flow, with one symbol per contact term."""
 
     variables: tuple[sympy.Symbol, ...]
-    rates: tuple[sympy.Expr, ...]  # in the variables, the parameters, FORCING and the symbols of `contacts`
+    rates: tuple[sympy.Expr, ...]  # in the variables, the parameters, functions of time and the symbols of `contacts`
     contacts: dict[sympy.Symbol, tuple[int, int, int]]  # stop, orders in x and in v of each needed contact term
     covariances: tuple[sympy.Symbol, ...]  # among the variables
 
@@ -42,13 +42,19 @@ class ReversedEquations(Equations):
 
     @cached_property
     def smooth_force(self) -> sympy.Expr:
-        """Acceleration without stops and without time-dependent excitations."""
+        """Acceleration without stops and without forces that vary in time."""
         return self._reversed(super().smooth_force)
 
     @cached_property
-    def forcing(self) -> sympy.Expr:
-        """Sum of the excitations that depend on time."""
-        return self._reversed(super().forcing)
+    def in_time(self) -> Forcing:
+        """The forces of the excitations; the steady one is that of the forward motion, as `smooth_force` needs it."""
+        forward = super().in_time
+        functions = {symbol: self._reversed(function) for symbol, function in forward.functions.items()}
+        return forward._replace(
+            varying=self._reversed(forward.varying),
+            functions=functions,
+            in_functions=self._reversed(forward.in_functions),
+        )
 
     @cached_property
     def _extra_drift(self) -> tuple[sympy.Expr, ...]:
@@ -73,8 +79,7 @@ def derive_flow(model: Equations, flow: Flow) -> FlowEquations:
     if flow.differentiates:
         model.check_derivatives()
     opaque = model.opaque_forces
-    forcing = FORCING if model.forcing != 0 else sympy.Integer(0)
-    drift = model.drift_with(forcing, opaque)
+    drift = model.drift_with(model.in_time.in_functions, opaque)
     variables: tuple[sympy.Symbol, ...] = model.state
     rates = list(drift)
     linear = drift.jacobian(list(model.state)) if flow.has_derivatives else None

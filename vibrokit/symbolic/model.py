@@ -91,7 +91,8 @@ class Model(Equations):
     @cached_property
     def undamped(self) -> bool:
         """Whether the motion conserves energy at the parameters of the scene: no friction, and conservative stops."""
-        return self._friction == 0 and self._conservative_stops
+        varying = sympy.diff(self.forcing.subs(self.numbers), self.state[1])
+        return self._friction == 0 and varying == 0 and self._conservative_stops
 
     @cached_property
     def balance(self) -> sympy.Expr | None:

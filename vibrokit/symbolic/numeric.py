@@ -12,18 +12,23 @@ from vibrokit.symbolic.contact import DEPTH, RATE
 from vibrokit.symbolic.equations import Equations
 from vibrokit.symbolic.printer import printable
 
+_SAMPLES = 32  # of a period, whose mean is exact for 31 harmonics
+
 Function = Callable[..., float]
 
 
 def drift_at(model: Equations) -> Callable[[Sequence[float]], list[float]]:
-    """Return the drift without stops and without excitations that depend on time, as a function of a state."""
-    functions = [_function(model, model.state, rate) for rate in model.drift_with(sympy.Integer(0), ())]
+    """Return the drift without stops and without forces of time alone, as a function of a state.
+
+    Of forces that vary in time with the state it has the mean over their period.
+    """
+    functions = [_function(model, model.state, rate) for rate in model.drift_with(_mean_of_modulated(model), ())]
     return lambda state: [function(*state) for function in functions]
 
 
 def jacobian_of(model: Equations) -> Callable[[Sequence[float]], list[list[float]]]:
     """Return the derivatives of that drift, shape (n, n), as a function of a state."""
-    matrix, size = model.drift_with(sympy.Integer(0), ()).jacobian(list(model.state)), len(model.state)
+    matrix, size = model.drift_with(_mean_of_modulated(model), ()).jacobian(list(model.state)), len(model.state)
     functions = [[_function(model, model.state, matrix[i, j]) for j in range(size)] for i in range(size)]
     return lambda state: [[function(*state) for function in row] for row in functions]
 
@@ -33,9 +38,21 @@ def amplitude_at(model: Equations, state: Sequence[float]) -> list[float]:
     return [_function(model, model.state, factor)(*state) for factor in model.amplitude]
 
 
-def excitation_of(model: Equations, index: int) -> Function:
-    """Return the force of one excitation (m s⁻²) as a function of time (s)."""
-    return _function(model, (model.time,), model.excitations[index])
+def excitation_of(model: Equations, index: int, x: float = 0.0) -> Function:
+    """Return the force of one excitation (m s⁻²) on a mass at rest at x (m) as a function of time (s)."""
+    place = {model.state[0]: sympy.Float(x), model.state[1]: sympy.Integer(0)}
+    return _function(model, (model.time,), model.excitations[index].subs(place))
+
+
+def _mean_of_modulated(model: Equations) -> sympy.Expr:
+    """The mean of the forces that depend on the state and vary periodically; 0 without any."""
+    found = sympy.Integer(0)
+    for part, force in zip(model.scene.excitations, model.excitations, strict=True):
+        if part.depends_on_state and part.period is not None and math.isfinite(part.period):
+            varying = sum(term for term in sympy.Add.make_args(force) if model.time in term.free_symbols)
+            times = (part.period * k / _SAMPLES for k in range(_SAMPLES))
+            found += sum(sympy.sympify(varying).subs(model.numbers).subs(model.time, t) for t in times) / _SAMPLES
+    return found
 
 
 def contact_force_of(model: Equations, index: int) -> Function:

@@ -7,7 +7,7 @@ which `rhs` calls for a single state.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import sympy
@@ -41,8 +41,8 @@ from vibrokit.kernels.intrinsics import keep_apart, promise_no_overlap, use_wide
 class SceneText:
     """The scene part of a kernel as text; a piece that the scene does not need is empty.
 
-    `variables` are the names of the integrated variables, and the first `states` of them belong to the state q. The
-    forcing depends on time if `forced`, and a contact force jumps at first touch if `jumps`.
+    `variables` are the names of the integrated variables, and the first `states` of them belong to the state q. Forces
+    that vary in time need the `functions` of time. A contact force jumps at first touch if `jumps`.
     """
 
     def __init__(self, scene: Scene, flow: Flow) -> None:
@@ -53,8 +53,13 @@ class SceneText:
         self._index = {symbol: index for index, symbol in enumerate(self._model.symbols.values())}
         self.variables = tuple(map(code_name, self._equations.variables))
         self.states = len(self._model.state)
-        self.forced = bool(self._model.forcing != 0)
+        self.functions = tuple(symbol.name for symbol in self._model.in_time.functions)
         self.jumps = any(contact.jumps for contact in self._model.contacts)
+
+    @property
+    def forced(self) -> bool:
+        """Whether the forcing depends on time."""
+        return bool(self.functions)
 
     @cached_property
     def parameters(self) -> dict[str, int]:
@@ -150,15 +155,20 @@ class SceneText:
 
     @property
     def forcing(self) -> str:
-        """Function `forcing(t, theta)`; empty for an autonomous scene."""
-        return self._function("forcing", "t", self._model.forcing, "INLINED_AND_CALLED") if self.forced else ""
+        """Function `forcing(t, theta)`: the value of the only function of time, or a tuple; empty without any."""
+        functions = self._model.in_time.functions
+        return self._function("forcing", "t", tuple(functions.values()), "INLINED_AND_CALLED") if functions else ""
 
     @property
     def excitations(self) -> str:
-        """Function `excitation(i, t, theta)`: the force of one excitation; empty for a scene without any."""
+        """Function `excitation(i, t, theta)`: the force of one excitation; empty for a scene without any.
+
+        Where a force depends on the state, the function is `excitation(i, t, x, v, theta)`.
+        """
         if not self._model.excitations:
             return ""
-        lines = ["@njit(**OPTIONS)", "def excitation(i, t, theta):"]
+        arguments = "t, x, v" if self._model.scene.depends_on_state else "t"
+        lines = ["@njit(**OPTIONS)", f"def excitation(i, {arguments}, theta):"]
         for index, force in enumerate(self._model.excitations):
             shared, texts = assignments({"force": force}, "c", indent="        ")
             values = unpack([force], self._index, indent="        ")
@@ -167,17 +177,19 @@ class SceneText:
 
     @property
     def derivative(self) -> str:
-        """Function `derivative(x, v, …, f, parameters…)`."""
+        """Function `derivative(x, v, …, f, parameters…)`, with the functions of time that there are."""
         return self._rates_function("derivative", switched=False)
 
     @property
     def rhs(self) -> str:
         """Functions `rates(x, v, …, f, on0, …, parameters…)` and `rhs(t, z, pushing, theta, out)`."""
         places = range(len(self.variables))
-        values = [*(f"z[{place}]" for place in places), *(["forcing(t, theta)"] if self.forced else [])]
+        values = [*(f"z[{place}]" for place in places)]
+        values += self.functions if len(self.functions) > 1 else ["forcing(t, theta)"] * self.forced
         values += [f"pushing[{stop}]" for stop in range(len(self._model.contacts))]
         values += [f"theta[{place}]" for place in self.parameters.values()]
         lines = ["@njit(**OPTIONS)", "def rhs(t, z, pushing, theta, out):", "    keep_apart()"]
+        lines += [f"    {', '.join(self.functions)} = forcing(t, theta)"] * (len(self.functions) > 1)
         lines += [f"    {', '.join(f'out[{place}]' for place in places)} = rates({', '.join(values)})", ""]
         return "\n".join([self._rates_function("rates", switched=True), "", *lines])
 
@@ -185,7 +197,7 @@ class SceneText:
         contact_lines, zero = self._contacts.lines(switched)
         lines, texts = self._rates(zero)
         switches = [f"on{stop}" for stop in range(len(self._model.contacts))] if switched else []
-        arguments = [*self.variables, *(["f"] if self.forced else []), *switches, *self.parameters]
+        arguments = [*self.variables, *self.functions, *switches, *self.parameters]
         head = f"def {name}({', '.join(arguments)}):"
         values = ", ".join(texts[variable] for variable in self.variables)
         return "\n".join(["@njit(**INLINED)", head, *contact_lines, *lines, f"    return {values}", ""])
@@ -251,20 +263,20 @@ class SceneText:
     @property
     def amplitude(self) -> str:
         """Function `amplitude` = √D g(x, v), for the flow with noise."""
-        return self._function("amplitude", "x, v", self._amplitude()) if self.flow is Flow.NOISY else ""
+        return self._function("amplitude", "x, v", (self._amplitude(),)) if self.flow is Flow.NOISY else ""
 
     @property
     def slope(self) -> str:
         """Function `slope`: the derivative of `amplitude` in the driven state; empty where that is 0."""
         slope = sympy.diff(self._amplitude(), self._model.state[-1]) if self.flow is Flow.NOISY else 0
-        return "" if slope == 0 else self._function("slope", "x, v", slope)
+        return "" if slope == 0 else self._function("slope", "x, v", (slope,))
 
     def _amplitude(self) -> sympy.Expr:
         return sympy.sqrt(self._model.symbols["noise.intensity"]) * self._model.amplitude[self.states - 1]
 
-    def _function(self, name: str, arguments: str, value: sympy.Expr, options: str = "INLINED") -> str:
-        lines, texts = assignments({name: value}, "c")
-        body = [*unpack([value], self._index), *lines, f"    return {texts[name]}"]
+    def _function(self, name: str, arguments: str, values: Sequence[sympy.Expr], options: str = "INLINED") -> str:
+        lines, texts = assignments({str(place): value for place, value in enumerate(values)}, "c")
+        body = [*unpack(values, self._index), *lines, f"    return {', '.join(texts.values())}"]
         return "\n".join([f"@njit(**{options})", f"def {name}({arguments}, theta):", *body, ""])
 
     def _rates(self, zero: Iterable[sympy.Symbol] = ()) -> tuple[list[str], dict[str, str]]:

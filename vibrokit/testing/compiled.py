@@ -44,14 +44,22 @@ class Compiled:
         return name in vars(self._module)
 
     def call(self, name: str, *arguments: Any) -> float:
-        """Call `forcing`, `law`, `amplitude` or `slope` with the parameters of the scene."""
+        """Call `law`, `amplitude` or `slope` with the parameters of the scene."""
         return float(getattr(self._module, name)(*arguments, self.theta))
 
-    def derivative(self, z: Any, forcing: float = 0.0) -> Any:
-        """Rates as computed by steppers that pack lanes."""
+    def forcing(self, time: float) -> tuple[float, ...]:
+        """Values of the functions of time that the rates need."""
+        if not self.has("forcing"):
+            return ()
+        values = self._module.forcing(time, self.theta)
+        return tuple(map(float, values)) if isinstance(values, tuple) else (float(values),)
+
+    def derivative(self, z: Any, forcing: tuple[float, ...] = ()) -> Any:
+        """Rates as computed by steppers that pack lanes, with values of the functions of time; 0 for those left out."""
         function = self._module.derivative
         names = list(inspect.signature(function.py_func).parameters)[self.size :]
-        rest = [forcing if name == "f" else self._named[name] for name in names]
+        given = iter(forcing)
+        rest = [self._named[name] if name in self._named else next(given, 0.0) for name in names]
         return np.array(function(*map(float, z), *map(float, rest)))
 
     def rhs(self, z: Any, pushing: tuple[bool, ...] = (), time: float = 0.0) -> Any:

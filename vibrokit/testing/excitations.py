@@ -11,19 +11,22 @@ import sympy
 
 from vibrokit.oscillator import Oscillator
 from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.noise import WhiteNoise
 from vibrokit.parts.spring import CubicSpring
 from vibrokit.registry import Group
 from vibrokit.symbolic.flow_kind import Flow
-from vibrokit.testing.compiled import Compiled
+from vibrokit.testing.compiled import ENTRIES, Compiled, hamiltonian_start
 from vibrokit.testing.forced import Forcing, motion_from_rest
 from vibrokit.testing.motion import SAME, Motion, compare, numeric, reference_end
-from vibrokit.testing.part_checks import PartChecks
+from vibrokit.testing.part_checks import PartChecks, Rng
+from vibrokit.testing.precise import derivative
 from vibrokit.testing.report import Check, ConformanceError
 
 _FRACTIONS = (2, 3, 5, 7)
 _PLACE = (0.6, -0.4)  # a state in which a force that depends on it is followed in time
 _LONG = 20 * math.pi  # a motion under a force that never repeats: ten free oscillations
 _SAME_OF_MANY = 1e-2  # of the size of the motion: fixed steps see a jump within one of them
+_STATE = 2.0  # largest displacement and velocity of the states at which a force is compared
 
 
 class ExcitationChecks(PartChecks[Excitation]):
@@ -31,9 +34,16 @@ class ExcitationChecks(PartChecks[Excitation]):
 
     kind: ClassVar[type[Excitation]] = Excitation
     group = Group.EXCITATIONS
-    arguments = (sympy.Symbol("t", real=True),)
     place = "excitations.0"
     reach, count = 50.0, 20
+
+    def __init__(self, part: Excitation | type[Excitation], rng: Rng = 0) -> None:
+        super().__init__(part, rng)
+        self.arguments = tuple(sympy.Symbol(name, real=True) for name in self.cls.variables)
+
+    def points(self) -> list[tuple[float, ...]]:
+        """Random times, and states of moderate size."""
+        return [(time, *(_STATE / self.reach * q for q in state)) for time, *state in super().points()]
 
     def physics(self) -> tuple[Check, ...]:
         return (
@@ -132,10 +142,16 @@ class ExcitationChecks(PartChecks[Excitation]):
             natural_frequency=1.0,
             damping_ratio=0.0,
             spring=CubicSpring(linear=0.0, cubic=0.0),
+            noise=WhiteNoise(intensity=1.0),
             excitations=(part,),
         )
-        code, reference, start = Compiled(scene, Flow.STATE), self.reference(part), (0.0, 0.0)
-        for (time,) in self.points():
-            forcing = code.call("forcing", time) if code.has("forcing") else 0.0
-            for found in (code.derivative(start, forcing)[1], code.rhs(start, time=time)[1]):
-                yield reference.check(f"the force of {part!r}", (time,), found)
+        code, formula = Compiled(scene, Flow.HAMILTONIAN_VARIATIONAL), self.expression(part)
+        for orders, (index, momentum, factor) in ENTRIES.items():
+            if sum(orders) and not part.depends_on_state:
+                continue
+            reference = self.reference(part, derivative(formula, self.arguments, (0, *orders)[: len(self.arguments)]))
+            for time, *state in self.points():
+                start = hamiltonian_start(tuple(state) or (0.0, 0.0), momentum)
+                for rates in (code.derivative(start, code.forcing(time)), code.rhs(start, time=time)):
+                    what = f"the derivative of orders {orders} of {part!r}" if sum(orders) else f"the force of {part!r}"
+                    yield reference.check(what, (time, *state), rates[index], factor)

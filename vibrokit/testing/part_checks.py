@@ -40,7 +40,7 @@ class PartChecks(ABC, Generic[P]):
     kind: ClassVar[type[Part]]
     group: ClassVar[Group]
     method: ClassVar[str] = "force"
-    arguments: ClassVar[tuple[sympy.Symbol, ...]]
+    arguments: tuple[sympy.Symbol, ...]
     place: ClassVar[str]
     """Path of the part in its scene."""
     reach: ClassVar[float] = 2.0

@@ -92,19 +92,19 @@ class GraphSolution:
             found.setdefault(energy.target, []).append(energy)
         return tuple(_best(some) for some in found.values())
 
-    def dataset(self, *, mirrored: bool = False) -> xarray.Dataset:
-        """Return the potential on the section, and the cheapest path, or their mirror images half a period later.
+    def dataset(self, *, mirrored_after: float | None = None) -> xarray.Dataset:
+        """Return the potential on the section, and the cheapest path, or their mirror images after a part of a period.
 
         The variables are those of `vibrokit.results.least_action.ActionGraphResult`, without ``source``.
         """
         grids = self.potential.grids
-        later = grids.steps // 2 if mirrored and grids.phases > 1 else 0
+        later = round((mirrored_after or 0.0) * grids.steps) if grids.phases > 1 else 0
         nodes, values = self.potential.on_section(later)
         path = np.full((1, 3), np.nan)
         if self.candidates:
             times, states = self.candidates[0].times, self.candidates[0].states[later:]
             path = np.column_stack([times[: len(states)], states])
-        if mirrored:
+        if mirrored_after is not None:
             nodes, values, path = -nodes[::-1, ::-1], values[::-1, ::-1], path * [1.0, -1.0, -1.0]
         known, (t, x, v) = np.where(values < self.potential.ceiling, values, np.nan), path.T
         return xarray.Dataset(

@@ -1,6 +1,7 @@
 """Mirror: exit paths that are known, mirrored in a scene whose forces and noise are odd.
 
-Such a scene has the symmetry (x, v) → (−x, −v), with forcing after half of the time after which it repeats.
+Such a scene has the symmetry (x, v) → (−x, −v): with forcing of odd harmonics after half of the time after which it
+repeats, and where a force varies as a factor of an odd function of the state, as a stiffness does, at the same time.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from vibrokit.results.attractor import Attractor
 from vibrokit.results.energy import ActivationEnergy, ExitPath
 
 FINDER = "mirror images"
+_CLOSE = 1e-2  # of the region's widths
 _COMPARED, _TIMES = 32, 4  # samples of an orbit, of the region and of each stop that are compared; at these many times
 
 Array = NDArray[np.float64]
@@ -30,13 +32,25 @@ class Mirror:
     def __init__(self, problem: ExitProblem) -> None:
         self._problem, scene = problem, problem.scene
         self._spacing = scene.section_interval / samples_of(scene)
-        self._half = 0 if scene.autonomous else samples_of(scene) // 2  # samples after which the scene is mirrored
 
     @cached_property
     def image(self) -> int | None:
         """Label of the attractor's mirror image, which may be the attractor itself; None if there is none."""
-        label = self._label_of(self._problem.attractor)
-        return label if label is not None and self._is_odd else None
+        if not self._alike(self._problem.attractor) or self._later is None:
+            return None
+        return self._label_of(self._problem.attractor)
+
+    @property
+    def later(self) -> float:
+        """After which part of a section interval the scene is mirrored, where an attractor has an image: 0 or ½."""
+        return 0.5 if self._later else 0.0
+
+    @cached_property
+    def _later(self) -> int | None:
+        """Samples after which the scene is mirrored; None if it is not."""
+        half = samples_of(self._problem.scene) // 2
+        shifts = (0,) if self._problem.scene.autonomous else (0, half)
+        return next((shift for shift in shifts if self._is_odd_after(shift)), None)
 
     def target(self, exit_: ActivationEnergy) -> int | None:
         """Return the target of an exit's mirror image; None unless that is a path of the attractor to a saddle."""
@@ -56,20 +70,36 @@ class Mirror:
         ]
 
     def _label_of(self, attractor: Attractor) -> int | None:
-        """The label of the mirror image of an attractor; None if there is none."""
-        some = attractor.orbit[np.linspace(0, len(attractor.orbit) - 1, _COMPARED).astype(np.int64), None]
-        widths = np.ptp(self._problem.structure.basins.region.bounds, axis=1)[:2]
+        """The label of the mirror image of an attractor, at the right time; None if there is none."""
+        return next((other.label for other in self._alike(attractor) if self._in_time(attractor, other)), None)
+
+    def _in_time(self, attractor: Attractor, other: Attractor) -> bool:
+        """Whether the mirror image of an attractor, whose orbit is that of another one, meets the section where it."""
+        if self._problem.scene.autonomous:
+            return True
+        share = (np.arange(attractor.period) + self.later) / attractor.period
+        places = share * (len(attractor.orbit) - 1)
+        met = np.column_stack([np.interp(places, np.arange(len(attractor.orbit)), one) for one in attractor.orbit.T])
+        offsets = np.linalg.norm((met[:, None] + other.points[None, :, :2]) / self._widths, axis=2)
+        return bool(offsets.min(axis=1).max() < _CLOSE)
+
+    @property
+    def _widths(self) -> Array:
+        return np.ptp(self._problem.structure.basins.region.bounds, axis=1)[:2]
+
+    def _alike(self, attractor: Attractor) -> list[Attractor]:
+        """The attractors on whose orbits the mirror image of an attractor lies, at whatever times."""
+        found, some = [], attractor.orbit[np.linspace(0, len(attractor.orbit) - 1, _COMPARED).astype(np.int64), None]
         for other in self._problem.structure.attractors:
             if attractor.repeats and (other.kind, other.period) == (attractor.kind, attractor.period):
-                offsets = np.linalg.norm((some + other.orbit) / widths, axis=2)
-                if offsets.min(axis=1).max() < 1e-2:  # of the region's widths
-                    return other.label
-        return None
+                offsets = np.linalg.norm((some + other.orbit) / self._widths, axis=2)
+                if offsets.min(axis=1).max() < _CLOSE:
+                    found.append(other)
+        return found
 
-    @cached_property
-    def _is_odd(self) -> bool:
+    def _is_odd_after(self, samples: int) -> bool:
         """Whether Hamilton's equations are odd: anywhere in the region, and at small and large depths of each stop."""
-        points, later = self._points(), self._half * self._spacing
+        points, later = self._points(), samples * self._spacing
         field, n = VectorField(self._problem.scene), points.shape[1] // 2
         for time in self._problem.scene.section_interval * np.arange(_TIMES) / _TIMES:
             here = field.hamiltonian_rate(points[:, :n], points[:, n:], time)
@@ -92,6 +122,7 @@ class Mirror:
 
     def _mirrored(self, target: int, path: ExitPath, action: float) -> Candidate:
         """The mirror image from where it is first on the section; without momenta if it has several legs."""
-        times = self._spacing * (np.arange(self._half, len(path.t), dtype=np.float64) + self._half)
-        momenta = None if (path.p == 0).all(axis=1).any() else -path.p[self._half :]
-        return Candidate(self._problem.source, target, times, -path.q[self._half :], action, FINDER, momenta)
+        later = self._later or 0
+        times = self._spacing * (np.arange(later, len(path.t), dtype=np.float64) + later)
+        momenta = None if (path.p == 0).all(axis=1).any() else -path.p[later:]
+        return Candidate(self._problem.source, target, times, -path.q[later:], action, FINDER, momenta)
