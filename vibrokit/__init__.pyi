@@ -56,8 +56,8 @@ from .parts.noise import StateDependentNoise as StateDependentNoise
 from .parts.noise import StationaryNoise as StationaryNoise
 from .parts.noise import WhiteNoise as WhiteNoise
 from .parts.parameter import parameter as parameter
-from .parts.periodic import Periodic as Periodic
 from .parts.parametric import ParametricStiffness as ParametricStiffness
+from .parts.periodic import Periodic as Periodic
 from .parts.pulses import PulseTrain as PulseTrain
 from .parts.spring import CubicSpring as CubicSpring
 from .parts.spring import CustomSpring as CustomSpring
