@@ -279,7 +279,7 @@ def full_continuation() -> Continuation:
     return Continuation(
         parameter="excitations.0.frequency",
         symbol="omega",
-        unit="s^-1",
+        unit="rad s^-1",
         region=REGION,
         states=(
             SteadyStates(0.1 + 0.2, (one, other), (0, 1), (Finding.of(Code.STEADY_STATES, count=2, starts=9),)),

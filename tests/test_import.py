@@ -8,7 +8,7 @@ import pytest
 
 import vibrokit
 
-HEAVY = {"numpy", "sympy", "numba", "scipy", "matplotlib", "xarray"}
+HEAVY = {"numpy", "sympy", "numba", "scipy", "matplotlib", "xarray", "pint"}
 
 
 def loaded_heavy(statement: str) -> set[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 import json
+import math
 import os
 import tomllib
 from collections.abc import Callable, Mapping
@@ -11,6 +13,7 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
+from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import SceneError, UnknownNameError, VibrokitError, nearest, nearest_form, shown
 from vibrokit.oscillator import Oscillator
@@ -21,6 +24,7 @@ from vibrokit.parts.own_numbers import NUMBERS
 from vibrokit.parts.part import Part
 from vibrokit.parts.scene import Scene
 from vibrokit.parts.single_parts import SINGLE_PARTS
+from vibrokit.quantity import Quantity
 from vibrokit.registry import Group, load, name_of
 from vibrokit.results.atomic import write_atomically
 
@@ -29,8 +33,9 @@ _LARGEST_FILE = 100_000
 _MOST_PARTS = 100
 _LONGEST_NAME = 100
 _NUMBERS = tuple(declared.name for declared in NUMBERS)
-_KEYS = (*_NUMBERS, "spring", "friction", "barriers", "excitations", "noise")
+_KEYS = ("mass", *_NUMBERS, "spring", "friction", "barriers", "excitations", "noise")
 _GROUPS = {"spring": Group.SPRINGS, "friction": Group.FRICTIONS, "noise": Group.NOISE_MODELS}  # of `SINGLE_PARTS`
+_GIVEN = "given"  # in records: what was given with a unit, as text by path, beside the numbers
 _BARRIER_KEYS = ("law", "position", "side", "adhesive")
 
 
@@ -132,7 +137,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 def scene_text(scene: Scene) -> str:
     """Return the TOML text of a scene file; raises SceneError if the class of a part is not registered."""
-    data = scene_data(scene)
+    data = _exchanging(_tables(scene), str)
     for kind, values in _named_parts(data):
         if ":" in values["name"]:
             raise SceneError(
@@ -143,8 +148,27 @@ def scene_text(scene: Scene) -> str:
 
 
 def scene_data(scene: Scene) -> dict[str, Any]:
-    """Return a scene as the plain data of a scene file. A class that is not registered is named module:Class."""
+    """Return a scene as plain data: numbers in SI base units per unit mass, and beside them what was given with a unit.
+
+    A class that is not registered is named module:Class.
+    """
+    given = {path: quantity.text for path, quantity in scene.quantities.items()}
+    return _exchanging(_tables(scene), float) | ({_GIVEN: given} if given else {})
+
+
+def _exchanging(data: Any, exchange: Callable[[Quantity], Any]) -> Any:
+    """The tables of a scene with something else for each quantity."""
+    if isinstance(data, dict):
+        return {key: _exchanging(value, exchange) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_exchanging(value, exchange) for value in data]
+    return exchange(data) if isinstance(data, Quantity) else data
+
+
+def _tables(scene: Scene) -> dict[str, Any]:
+    """The tables of a scene file, with quantities."""
     data: dict[str, Any] = {entry.path: entry.value for entry in scene.given_numbers}
+    data |= {} if scene.mass is None else {"mass": scene.mass}
     data |= {name: _part_data(_GROUPS[name], part) for name, part in scene.single_parts.items()}
     if scene.barriers:
         data["barriers"] = [_barrier_data(barrier) for barrier in scene.barriers]
@@ -169,10 +193,13 @@ def _named_parts(data: Mapping[str, Any]) -> list[tuple[Group, dict[str, Any]]]:
 
 
 def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
-    """Return a checked oscillator from plain data."""
+    """Return a checked oscillator from the tables of a scene file, or from the plain data of a record."""
+    if _GIVEN in data:
+        return _from_record(data)
     _check_keys("scene", data, _KEYS, required=())
     given = {name: data[name] for name in _GROUPS if data.get(name) is not None}
     return Oscillator(
+        mass=data.get("mass"),
         **{name: data[name] for name in _NUMBERS if name in data},
         barriers=tuple(_barrier(f"barriers.{i}", b) for i, b in enumerate(_listed("barriers", data))),
         excitations=tuple(
@@ -181,6 +208,31 @@ def scene_from_data(data: Mapping[str, Any]) -> Oscillator:
         ),
         **{name: _part(name, _GROUPS[name], SINGLE_PARTS[name], values) for name, values in given.items()},
     )
+
+
+def _from_record(data: Mapping[str, Any]) -> Oscillator:
+    """The oscillator of plain data with texts of quantities beside its numbers, which must agree."""
+    tables, given = copy.deepcopy({key: value for key, value in data.items() if key != _GIVEN}), data[_GIVEN]
+    if not isinstance(given, Mapping):
+        raise SceneError(f"scene: {_GIVEN} must be a table of texts by path, got {shown(given)}.")
+    numbers = {path: _with_text(tables, path, text) for path, text in given.items()}
+    osc = scene_from_data(tables)
+    for path, quantity in osc.quantities.items():
+        if path in numbers and not math.isclose(quantity, real(numbers[path]), rel_tol=1e-12):
+            raise SceneError(f"scene: {path} is {shown(numbers[path])} and given as {shown(given[path])}; give one.")
+    return osc
+
+
+def _with_text(tables: Any, path: str, text: Any) -> Any:
+    """Put a text in place of a number of some tables, and return the number."""
+    *heads, last = path.split(".")
+    try:
+        for head in heads:
+            tables = tables[int(head) if isinstance(tables, list) else head]
+        number, tables[last] = tables[last], text
+    except (LookupError, TypeError, ValueError):
+        raise SceneError(f"scene: {shown(path)} is given as {shown(text)} and has no number.") from None
+    return number
 
 
 def _listed(key: str, data: Mapping[str, Any]) -> list[Any]:
@@ -233,7 +285,7 @@ def _check_keys(place: str, data: Any, known: Any, required: Any) -> None:
 
 
 def _toml(data: Mapping[str, Any]) -> str:
-    rows = [f"{key} = {_value(value)}" for key, value in data.items() if isinstance(value, float)]
+    rows = [f"{key} = {_value(value)}" for key, value in data.items() if isinstance(value, float | str)]
     for key, value in data.items():
         if isinstance(value, dict):
             rows += ["", f"[{key}]", *(f"{k} = {_value(v)}" for k, v in value.items())]

@@ -168,7 +168,7 @@ def test_noise_changes_mean_times_only():
     [
         ({"parameter": "frequenzy"}, "nearest is 'excitations.0.frequency'"),
         ({"parameter": {"barriers.0.position": 1, "frequency": 1}}, "tie parameters of one unit"),
-        ({"unit": "mm"}, "allowed are Hz, kHz, rad/s"),
+        ({"unit": "mm"}, "allowed are units of rad s.-1, such as Hz or rad/s"),
         ({"unit": "furlong"}, "furlong"),
         ({"values": [0.5, 0.5]}, "more than once"),
         ({"values": []}, "one or more"),

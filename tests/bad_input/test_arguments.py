@@ -15,7 +15,7 @@ from vibrokit.results.trajectory import Trajectory
 SCENE = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1)
 
 WRONG = [
-    (lambda: vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, mass=2.0), "mass"),
+    (lambda: vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, weight=2.0), "weight"),
     (lambda: vk.Harmonic(amplitude=1.0, hz=50.0), "hz"),
     (lambda: vk.WhiteNoise(psd=1.0), "psd"),
     (lambda: vk.Barrier(vk.Hertz(1.0), position=1.0, side="left", gap=1.0), "gap"),

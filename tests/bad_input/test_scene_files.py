@@ -61,6 +61,22 @@ CHANGES = [
     ("\nfrequency = 0.57", "\nfrequency = 0", f"excitations.0: Harmonic: frequency {POSITIVE}0."),
     ("natural_frequency = 1.0", "natural_frequency = 0", "damping_ratio is 0.01, but that is relative to a natural"),
     ("stiffness = 50.0", 'stiffness = "50"', f"stiffness {LOW}'50'."),
+    ("stiffness = 50.0", 'stiffness = "50 kN/m"', "barriers.0.law: Hertz: stiffness must be in m^(-1/2) s^-2, or kg "
+     "m^-0.5 s^-2 with the mass of the scene, got '50 kN/m', which is in kg s^-2; allowed"),
+    ("stiffness = 50.0", 'stiffness = "50 kN/m^1.5"', "scene: barriers.0.law.stiffness is 50 kN/m^1.5, which needs the "
+     "mass; give the scene a mass, such as mass='0.35 kg', or the value per unit mass."),
+    ("position = 0.5", 'position = "0.5 mmm"', "barriers.0: Barrier: position has the unknown unit 'mmm'; allowed are "
+     "units of m, such as mm."),
+    ("position = 0.5", 'position = "half a mm"', "position must be a finite number, got 'half a mm'."),
+    ("\nfrequency = 0.57", '\nfrequency = "0 Hz"', f"frequency {POSITIVE}0."),
+    ("\nfrequency = 0.57", '\nfrequency = "1e400 Hz"', f"frequency {POSITIVE}one above 1.8e308."),
+    ("\nfrequency = 0.57", '\nfrequency = "57 Hz^9^9^9"', "frequency has the unknown unit 'Hz^9^9^9'"),
+    ("intensity = 2e-5", 'intensity = "-1 g_n^2/Hz"', f"noise: WhiteNoise: intensity {LOW}-48.0852."),
+    ("damping_ratio", "mass = 0\ndamping_ratio", f"scene: mass {POSITIVE}0."),
+    ("damping_ratio", 'mass = "-1 kg"\ndamping_ratio', f"scene: mass {POSITIVE}-1."),
+    ("damping_ratio", 'mass = "1 N"\ndamping_ratio', "scene: mass must be in kg, got '1 N', which is in kg m s^-2; "
+     "allowed are units of kg, such as kg or g."),
+    ("damping_ratio", "mass = [1]\ndamping_ratio", f"scene: mass {POSITIVE}[1]."),
     ("stiffness = 50.0", "stiffness = [50.0]", f"stiffness {LOW}[50.0]."),
     ("stiffness = 50.0", "stiffness = {k = 1}", f"stiffness {LOW}{{'k': 1}}."),
     ("stiffness = 50.0", "stiffness = true", f"stiffness {LOW}True."),

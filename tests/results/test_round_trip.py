@@ -115,7 +115,7 @@ def test_xarray_alone_reads_a_continuation(tmp_path):
     sweep.save(tmp_path / "c.nc")
     with xarray.open_dataset(tmp_path / "c.nc", engine="scipy") as file:
         np.testing.assert_array_equal(file.value, sweep.values)
-        assert file.value.units == file.bifurcation_value.units == "s^-1"
+        assert file.value.units == file.bifurcation_value.units == "rad s^-1"
         np.testing.assert_array_equal(file.value[file.attractor_at], [0.1 + 0.2, 0.1 + 0.2, 0.75])
         assert file.bifurcation_kind.values.tolist() == ["grazing", "Neimark–Sacker"]
         assert file.parameter == "excitations.0.frequency"

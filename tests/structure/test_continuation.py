@@ -58,7 +58,7 @@ def test_branches_keep_their_identity(paper):
     for at in paper.states:
         assert [attractor.label for attractor in at.attractors] == list(range(len(at.attractors)))
         assert len({attractor.name for attractor in at.attractors} - {""}) == len(at.attractors)
-    assert "ω (s⁻¹)" in paper.plot().ax.get_xlabel()
+    assert "ω (rad s⁻¹)" in paper.plot().ax.get_xlabel()
     assert len(paper.plot_fractions().areas) == len(paper.branches)
 
 

@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from numbers import Real
 
 from vibrokit.arguments import real
-from vibrokit.errors import ParameterError, StructureError, nearest, shown
+from vibrokit.errors import ParameterError, StructureError, shown
+from vibrokit.quantity import number_in
 from vibrokit.text_table import power_text
-from vibrokit.text_units import split_number
 
 _MINUTE, _HOUR, _DAY = 60.0, 3600.0, 86400.0
 _YEAR = 365.25 * _DAY
-_UNITS: Mapping[str, float] = {
-    "ns": 1e-9, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ms": 1e-3,
-    "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0,
-    "min": _MINUTE, "minute": _MINUTE, "minutes": _MINUTE,
-    "h": _HOUR, "hr": _HOUR, "hour": _HOUR, "hours": _HOUR,
-    "d": _DAY, "day": _DAY, "days": _DAY, "week": 7 * _DAY, "weeks": 7 * _DAY,
-    "a": _YEAR, "y": _YEAR, "yr": _YEAR, "year": _YEAR, "years": _YEAR,
-}  # fmt: skip
 _PERIODS = ("period", "periods")
 _SHOWN = (("years", _YEAR, 2.0), ("days", _DAY, 2.0), ("hours", _HOUR, 2.0), ("minutes", _MINUTE, 2.0))
 
@@ -31,26 +21,30 @@ def seconds_in(text: object, period: float | None = None) -> float:
     `period` is the section interval (s). Raises ParameterError for what is no positive finite duration.
     """
     example = "give a number of seconds, or a number with a unit, such as '8 h' or '1 yr'"
-    if isinstance(text, Real) and not isinstance(text, bool):
-        number, unit = real(text), "s"
-    else:
-        split = split_number(text) if isinstance(text, str) else None
-        if split is None:
-            raise ParameterError(f"The duration {shown(text)} is not one; {example}.")
-        number, unit = split[0], split[1] or "s"
-    if unit.lower() in _PERIODS:
-        if period is None:
-            raise ParameterError(f"The duration {shown(text)} is in periods, and the scene has no section; {example}.")
-        scale = period
-    elif unit in _UNITS or unit.lower() in _UNITS:
-        scale = _UNITS.get(unit) or _UNITS[unit.lower()]
-    else:
-        raise ParameterError(
-            f"The unit {unit!r} of the duration {shown(text)} is unknown{nearest(unit, (*_UNITS, *_PERIODS))}"
-        )
-    if not 0 < number * scale < math.inf:
-        raise ParameterError(f"The duration {shown(text)} must be positive and finite; {example}.")
-    return number * scale
+    owner, seconds = f"The duration {shown(text)}", math.nan
+    if isinstance(text, str):
+        words = text.lower().split()
+        if words[1:] and words[-1] in _PERIODS:
+            if period is None:
+                raise ParameterError(f"{owner} is in periods, and the scene has no section; {example}.")
+            seconds = number_in(owner, words[0], "s")[0] * period
+        else:
+            seconds = _of_text(owner, text)
+    elif not isinstance(text, bool):
+        seconds = real(text)
+    if not 0 < seconds < math.inf:
+        raise ParameterError(f"{owner} must be positive and finite; {example}.")
+    return seconds
+
+
+def _of_text(owner: str, text: str) -> float:
+    """Seconds of a text, whose unit may have capital letters where none are meant."""
+    try:
+        return number_in(owner, text, "s")[0]
+    except ParameterError:
+        if text == text.lower():
+            raise
+    return number_in(owner, text.lower(), "s")[0]
 
 
 def required_time(mean_time: float | str, period: float) -> float:

@@ -18,7 +18,7 @@ from vibrokit.oscillator import Oscillator, check_oscillator
 from vibrokit.parts.barrier import Barrier
 from vibrokit.symbolic.numeric import amplitude_at, contact_force_of
 from vibrokit.text_table import text_table
-from vibrokit.text_units import size_of
+from vibrokit.text_units import STANDARD_GRAVITY
 
 # The correct scenes of tests/assessment/test_plausibility.py lie within these limits, except those counted there.
 _FAR = 100.0  # of a ratio of forcing to natural frequency, or of amplitude to gap: two decades from resonance
@@ -56,7 +56,7 @@ class Measure(StrEnum):
     FIRST_CONTACT = "first-contact", "ΔU of the first contact", "m² s⁻³"
     FIRST_CONTACT_OVER_D = "first-contact-over-d", "ΔU of the first contact over D"
     PSD = "psd", "noise as one-sided spectral density", "(m/s²)²/Hz"
-    PSD_G = "psd-g", "noise as one-sided spectral density", "g²/Hz"
+    PSD_G = "psd-g", "noise as one-sided spectral density", "g_n²/Hz"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,7 +163,7 @@ def _noise(osc: Oscillator, response: LinearResponse | None) -> Iterator[Row]:
         factor = amplitude_at(osc.model, (response.rest if response else 0.0, 0.0))[1]
         density = 2 * osc.noise.intensity * factor**2
         yield Row(Measure.PSD, density)
-        yield Row(Measure.PSD_G, density / size_of("g", "m s^-2") ** 2)
+        yield Row(Measure.PSD_G, density / STANDARD_GRAVITY**2)
 
 
 def _stop(osc: Oscillator, response: LinearResponse, index: int, barrier: Barrier) -> Iterator[Row | Oddity]:

@@ -19,6 +19,7 @@ from vibrokit.construction import called
 from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, stage, working
+from vibrokit.quantity import size_of
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
@@ -35,7 +36,6 @@ from vibrokit.structure.continuation import continuation
 from vibrokit.structure.find import find_structure
 from vibrokit.structure.parameter_values import ParameterLine, ordered_values, parameter_line
 from vibrokit.structure.validation import check_means, seed_of
-from vibrokit.text_units import size_of
 
 _DEPTH = 5.0  # ΔU/D at which exits are simulated for the prefactor: the lesser, the faster, and above 4 exits are rare
 _ALONG = (Code.BIFURCATION, Code.BRANCH_ENDS, Code.PATH_LOST, Code.LEAST_PATH_CHANGES, Code.NOTHING_AT)
@@ -79,8 +79,9 @@ def sweep(
         Finite and distinct, one or more; they are taken in ascending order.
     unit : str, optional
         Unit of the values, in which tables and pictures show them too: ``"Hz"`` for a frequency, ``"mm"`` or ``"µm"``
-        for a length, ``"g"`` for a force per unit mass, ``"g²/Hz"`` for noise by its one-sided spectral density. By
-        default SI base units.
+        for a length, ``"g_n"`` or, in a scene with a mass, ``"N"`` for a force, ``"g_n^2/Hz"`` for noise by its
+        one-sided spectral density. By default the values are in SI base units, and are shown in the unit in which the
+        scene has the parameter.
     source : int or str, optional
         Name or number of the branch to leave; by default each.
     energies : bool
@@ -108,7 +109,7 @@ def sweep(
     """
     check_means(osc, None, None)
     line, seed = parameter_line("sweep", osc, parameter), seed_of(rng)
-    size = 1.0 if unit is None else size_of(unit, line.entry.declared.unit)
+    size = 1.0 if unit is None else size_of(unit, line.entry.declared.unit, osc.mass)
     numbers = size * ordered_values("sweep", values)
     wanted = energies and osc.noise is not None
     listed = None if search is None else (size * ordered_values("sweep: search", search)).tolist()
@@ -149,7 +150,7 @@ class _Run:
             energies=self.paths, prefactors=tuple(self.prefactors), complete=self.complete, seed=settings["rng"],
             scene=scene_data(self.osc), settings=dict(settings), seconds=work.seconds, stats=work.stats,
         )  # fmt: skip
-        parts = self._of_parts(found.axis(found.shown_in)[1])
+        parts = self._of_parts(found.axis()[1])
         findings = (*parts, *among_others(found), *_strong(found), *self.findings)
         return dataclasses.replace(found, findings=findings)
 
@@ -276,7 +277,7 @@ def among_others(found: Sweep) -> Iterator[Finding]:
     among = {states[value] for value in found.searched.tolist()}
     others = [value for value in found.values[known].tolist() if states[value] not in among]
     if others:
-        at = [value / found.axis(found.shown_in)[1] for value in others]
+        at = [value / found.axis()[1] for value in others]
         yield Finding.of(Code.OTHER_STATES, parameter=found.parameter, at=at)
 
 

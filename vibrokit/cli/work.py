@@ -17,6 +17,7 @@ from vibrokit.assessment.plausibility import plausibility
 from vibrokit.assessment.sweep import sweep
 from vibrokit.cli.long_work import Interrupts, check_targets, scene_stem, source_of
 from vibrokit.errors import ParameterError, shown
+from vibrokit.quantity import number_in, size_of
 from vibrokit.report.assessment import Question, assessment_data, assessment_text
 from vibrokit.report.text import record_text
 from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, reproduce
@@ -24,7 +25,6 @@ from vibrokit.results.atomic import save_figure
 from vibrokit.results.record import versions
 from vibrokit.scene_file import load_scene
 from vibrokit.structure.parameter_values import parameter_line
-from vibrokit.text_units import number_in, size_of
 
 
 def assess_scene(options: argparse.Namespace) -> int:
@@ -74,13 +74,16 @@ def sweep_scene(options: argparse.Namespace) -> int:
     osc = load_scene(options.scene)
     line = parameter_line("sweep", osc, _parameter(options.parameter))
     base = line.entry.declared.unit
-    (first, unit), (last, other) = (number_in(text, base) for text in (options.start, options.stop))
+    (first, unit), (last, other) = (
+        number_in(line.path, text, base, osc.mass) for text in (options.start, options.stop)
+    )
     if unit != other:
         raise ParameterError(f"{options.start} and {options.stop} have different units; give both in one unit.")
-    searched = [number_in(text, base) for text in options.search.split(",")] if options.search else []
+    listed = options.search.split(",") if options.search else []
+    searched = [number_in(f"--search of {line.path}", text, base, osc.mass) for text in listed]
     if any(own != unit for _, own in searched):
         raise ParameterError(f"--search {options.search} has another unit than {options.start}; give both in one unit.")
-    size = 1.0 if unit is None else size_of(unit, base)
+    size = 1.0 if unit is None else size_of(unit, base, osc.mass)
     with Interrupts() as interrupts:
         with interrupts.working(options.time_limit):
             found = sweep(

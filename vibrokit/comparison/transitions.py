@@ -18,6 +18,7 @@ from vibrokit.construction import Constructed, called
 from vibrokit.documented import documented
 from vibrokit.errors import StructureError, shown
 from vibrokit.results.labels import exit_between, label_of
+from vibrokit.results.one_scene import per_unit_mass
 from vibrokit.results.result import Result
 from vibrokit.text_table import text_table
 
@@ -110,7 +111,10 @@ class Transitions(metaclass=Constructed):
         for result in results:
             if not isinstance(result, Result):
                 raise StructureError(f"transitions need results, as of LeastAction, got {shown(result)}.")
-        if not results or any((one.names, one.scene) != (results[0].names, results[0].scene) for one in results):
+        if not results or any(
+            (one.names, per_unit_mass(one.scene)) != (results[0].names, per_unit_mass(results[0].scene))
+            for one in results
+        ):
             raise StructureError("transitions need at least one result, and all results must be of one scene.")
         found = [energy for result in results for energy in result.energies if energy.target >= 0]
         if not found:

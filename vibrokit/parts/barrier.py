@@ -9,6 +9,7 @@ from vibrokit.construction import Constructed
 from vibrokit.errors import ParameterError, SceneError, shown
 from vibrokit.parts.contact import ContactLaw
 from vibrokit.parts.parameter import Parameter
+from vibrokit.quantity import Quantity
 
 _POSITION = Parameter("position", "position", "b", "m")
 
@@ -58,6 +59,16 @@ class Barrier(metaclass=Constructed):
     def parameters(self) -> dict[str, Any]:
         """Parameter values of the barrier itself, by name."""
         return {"position": self.position}
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """Parameter values of the barrier itself that were given with a unit, by name."""
+        return {"position": self.position} if isinstance(self.position, Quantity) else {}
+
+    def of_mass(self, mass: float | None) -> Self:
+        """Return the stop in a scene of a mass (kg)."""
+        law = self.law.of_mass(mass)
+        return self if law is self.law else dataclasses.replace(self, law=law)
 
     def replace(self, **changes: Any) -> Self:
         """Return a checked copy with some fields changed."""

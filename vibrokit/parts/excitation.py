@@ -74,7 +74,7 @@ class Harmonic(Excitation):
     """
 
     amplitude: float = parameter("f", "m s^-2")
-    frequency: float = parameter("omega", "s^-1", above=0)
+    frequency: float = parameter("omega", "rad s^-1", above=0)
     phase: float = parameter("phi", "rad", default=0.0)
 
     def force(self, t: Any) -> Any:

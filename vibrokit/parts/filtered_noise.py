@@ -29,7 +29,7 @@ class FilteredNoise(StationaryNoise):
 
     extra_states: ClassVar[tuple[str, ...]] = ("w", "y")
 
-    frequency: float = parameter("omega", "s^-1", above=0)
+    frequency: float = parameter("omega", "rad s^-1", above=0)
     damping_ratio: float = parameter("zeta", "", above=0)
 
     def amplitude(self, x: Any, v: Any) -> Any:

@@ -27,7 +27,7 @@ class FormulaPart(NamedConstants):
         check_parameter_names(tuple(constants), (*self.variables, "name", "formula", "constants"))
         read(formula, (*self.variables, *constants))
         checked = tuple(
-            (name, Parameter(name, name, name, "").checked(type(self).__name__, value))
+            (name, Parameter(name, name, name, None).checked(type(self).__name__, value))
             for name, value in constants.items()
         )
         object.__setattr__(self, "formula", formula)
@@ -41,7 +41,7 @@ class FormulaPart(NamedConstants):
         """Parameters of this part: its own, the formula (structural), then each constant."""
         formula = Parameter(self.formula_name, "formula", self.formula_name, "", structural=True)
         shaping = in_exponents(self.formula, self.variables)
-        constants = (Parameter(name, name, name, "", structural=name in shaping) for name, _ in self.constants)
+        constants = (Parameter(name, name, name, None, structural=name in shaping) for name, _ in self.constants)
         return (*self._own(), formula, *constants)
 
     def twin(self, values: Mapping[str, Any]) -> Self:

@@ -12,10 +12,10 @@ from vibrokit.errors import ParameterError, SceneError
 from vibrokit.parts.parameter import Entry, Parameter
 
 NUMBERS = (
-    Parameter("natural_frequency", "natural_frequency", "omega_n", "s^-1", minimum=0),
+    Parameter("natural_frequency", "natural_frequency", "omega_n", "rad s^-1", minimum=0),
     Parameter("stiffness", "stiffness", "kappa", "s^-2", minimum=0),
     Parameter("damping_ratio", "damping_ratio", "zeta", "", minimum=0),
-    Parameter("damping", "damping", "c", "s^-1", minimum=0),
+    Parameter("damping", "damping", "c", "s^-1", minimum=0, mass_power=1),
 )
 """In the order of the parameters of a scene, which has those that are given."""
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, shown
+from vibrokit.quantity import Quantity, is_quantity, read
 
 _KEY = "vibrokit.parameter"
 
@@ -26,12 +27,17 @@ class Parameter:
     symbol : str
         Symbol in equations, as SymPy writes it (``"k"``, ``"omega"``).
     unit : str or None
-        Unit in SI base units; ``""`` if dimensionless, None if undeclared.
+        Unit in SI base units, in which a value without a unit is; ``""`` if dimensionless, None if undeclared. An
+        angular frequency is in ``"rad s^-1"``: only then may it be given in Hz.
     minimum, above, maximum : float or None
         Allowed range: value ≥ minimum, value > above, value ≤ maximum.
     structural : bool
         True if the form of the equations depends on the value (an exponent, a formula); changing it triggers
         recompilation.
+    mass_power : int or None
+        Power of the mass that a value with a unit is divided by if its unit has the mass in it. None is 1 for units
+        with s^-2, such as that of a force or a stiffness per unit mass, 2 for m^2 s^-3, and 0 for others; give 1 to
+        a damping per unit mass, in s^-1, and 0 to an acceleration of a support.
     """
 
     name: str
@@ -42,6 +48,7 @@ class Parameter:
     above: float | None = None
     maximum: float | None = None
     structural: bool = False
+    mass_power: int | None = None
 
     @property
     def allowed(self) -> str:
@@ -56,8 +63,11 @@ class Parameter:
         return "a finite number" + (" " + " and ".join(words) if words else "")
 
     def checked(self, owner: str, value: Any) -> float:
-        """Return `value` as a float; raise ParameterError if it is not a number in the allowed range."""
-        number = real(value)
+        """Return `value` as a float; raise ParameterError if it is not a number in the allowed range.
+
+        A number with a unit, as text or of Pint, is a `Quantity`.
+        """
+        number = self._quantity(owner, value) if is_quantity(value) else real(value)
         outside = (
             not math.isfinite(number)
             or (self.minimum is not None and number < self.minimum)
@@ -69,6 +79,20 @@ class Parameter:
             given = "one above 1.8e308" if large else shown(value) if math.isnan(number) else f"{number:g}"
             raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {given}.")
         return number
+
+    def known(self, owner: str, value: Any) -> float:
+        """Return `value` as `checked` does, for a computation; ParameterError if it waits for the mass of a scene."""
+        number = self.checked(owner, value)
+        if isinstance(number, Quantity) and number.pending:
+            raise ParameterError(
+                f"{owner}: {self.name} is {number.text} and is computed with before a scene gives the mass; divide it "
+                f"by the mass, and give it in {self.unit}."
+            )
+        return float(number)
+
+    def _quantity(self, owner: str, value: Any) -> float:
+        number = read(f"{owner}: {self.name}", value, self.unit, self.mass_power)
+        return float(number) if self.structural else number
 
 
 class Entry(NamedTuple):
@@ -88,6 +112,7 @@ def parameter(
     above: float | None = None,
     maximum: float | None = None,
     structural: bool = False,
+    mass_power: int | None = None,
     default: Any = dataclasses.MISSING,
     name: str = "",
 ) -> Any:
@@ -98,7 +123,7 @@ def parameter(
     >>> class Cubic(ContactLaw):
     ...     stiffness: float = parameter("k", "m^-2 s^-2", minimum=0)
     """
-    declared = Parameter(name, "", symbol, unit, minimum, above, maximum, structural)
+    declared = Parameter(name, "", symbol, unit, minimum, above, maximum, structural, mass_power)
     return dataclasses.field(default=default, metadata={_KEY: declared})
 
 

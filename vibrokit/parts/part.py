@@ -7,11 +7,13 @@ import functools
 import inspect
 from abc import ABC
 from collections.abc import Callable, Mapping
+from numbers import Real
 from typing import Any, ClassVar, Self, dataclass_transform
 
 from vibrokit.construction import Constructed
 from vibrokit.errors import ArgumentError, ParameterError, nearest
 from vibrokit.parts.parameter import Parameter, declared_parameters, parameter
+from vibrokit.quantity import Quantity
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(parameter, dataclasses.field))
@@ -77,7 +79,8 @@ class Part(ABC, metaclass=Constructed):
         for declared in self._declared:
             value = getattr(self, declared.attribute)
             number = declared.checked(type(self).__name__, value)
-            if isinstance(value, float) or not declared.structural:  # a structural Fraction stays exact
+            exact = declared.structural and isinstance(value, Real) and not isinstance(value, float)
+            if not exact:  # a structural Fraction stays what it is
                 object.__setattr__(self, declared.attribute, number)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -102,6 +105,17 @@ class Part(ABC, metaclass=Constructed):
     def parameters(self) -> dict[str, Any]:
         """Parameter values by name."""
         return {declared.name: self._value(declared) for declared in self.declared()}
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """Parameter values that were given with a unit, by name."""
+        values = ((declared.name, getattr(self, declared.attribute)) for declared in self._declared)
+        return {name: value for name, value in values if isinstance(value, Quantity)}
+
+    def of_mass(self, mass: float | None) -> Self:
+        """Return the part in a scene of a mass (kg): forces that were given with units are divided by it."""
+        divided = {name: value.of_mass(mass) for name, value in self.quantities.items() if value.mass_power}
+        return self.replace(**divided) if divided else self
 
     def _value(self, declared: Parameter) -> Any:
         return getattr(self, declared.attribute)

@@ -16,12 +16,14 @@ from vibrokit.parts.common_period import common_period
 from vibrokit.parts.excitation import Excitation
 from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
-from vibrokit.parts.own_numbers import OwnNumbers, displaced, refuse_two_meanings
-from vibrokit.parts.parameter import Entry
+from vibrokit.parts.own_numbers import NUMBERS, OwnNumbers, displaced, refuse_two_meanings
+from vibrokit.parts.parameter import Entry, Parameter
 from vibrokit.parts.single_parts import FORCES_OF_STATE, SINGLE_PARTS
 from vibrokit.parts.spring import Spring
 from vibrokit.parts.time_scale import reference_frequency
+from vibrokit.quantity import Quantity
 
+_MASS = Parameter("mass", "mass", "m", "kg", above=0)
 _MOST_INTERVALS = 4096  # in a period, over which the forcing is tabulated
 
 
@@ -46,6 +48,10 @@ class Scene(OwnNumbers):
     spring : Spring, optional
     friction : Friction, optional
         Besides the damping.
+    mass : float or str, optional
+        In kg, or with a unit: ``"0.35 kg"``. Forces, stiffnesses, dampings and spectral densities of force that are
+        given with units, such as ``"6 N"``, are divided by it, and numbers without a unit are not. Scenes that differ
+        in nothing else are equal.
 
     Raises
     ------
@@ -58,6 +64,7 @@ class Scene(OwnNumbers):
     noise: NoiseModel | None = None
     spring: Spring | None = None
     friction: Friction | None = None
+    mass: float | None = dataclasses.field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         self._check_numbers(self.spring)
@@ -67,8 +74,37 @@ class Scene(OwnNumbers):
             _checked_parts(name, (part,), SINGLE_PARTS[name])
         if self.noise is not None:
             _check_names(self.noise)
+        self._divide_by_mass()
         self._check_stops()
         self._check_periods()
+
+    def _divide_by_mass(self) -> None:
+        """Divide what was given as a force by the mass; this is done nowhere else."""
+        mass = None if self.mass is None else _MASS.checked("scene", self.mass)
+        object.__setattr__(self, "mass", mass)
+        for declared in NUMBERS:
+            value = getattr(self, declared.name)
+            if isinstance(value, Quantity):
+                object.__setattr__(self, declared.name, value.of_mass(mass))
+        for name, part in self.single_parts.items():
+            object.__setattr__(self, name, part.of_mass(mass))
+        for name in ("barriers", "excitations"):
+            object.__setattr__(self, name, tuple(part.of_mass(mass) for part in getattr(self, name)))
+        for path, quantity in self.quantities.items():
+            if quantity.pending:
+                raise SceneError(
+                    f"scene: {path} is {quantity.text}, which needs the mass; give the scene a mass, such as "
+                    "mass='0.35 kg', or the value per unit mass."
+                )
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """What was given with a unit, by path."""
+        own = {name: getattr(self, name) for name in (_MASS.name, *(declared.name for declared in NUMBERS))}
+        found = {name: value for name, value in own.items() if isinstance(value, Quantity)}
+        for path, part in self.placed_parts():
+            found |= {f"{path}.{name}": value for name, value in part.quantities.items()}
+        return found
 
     def _check_stops(self) -> None:
         for side in ("left", "right"):

@@ -10,7 +10,7 @@ from vibrokit.errors import ParameterError, shown
 from vibrokit.parts.parameter import Parameter
 
 _MASS = Parameter("mass", "mass", "m", "kg", above=0)
-_LEVEL = Parameter("level", "level", "S", "m^2 s^-3", minimum=0)
+_LEVEL = Parameter("level", "level", "S", "m^2 s^-4 Hz^-1", minimum=0)
 
 
 class Measured(StrEnum):
@@ -43,10 +43,10 @@ def intensity_of(owner: str, level: Any, of: Any, mass: Any) -> float:
             raise ParameterError(
                 f"{owner}: mass is for the density of a force, got {shown(mass)} with of={str(of)!r}; leave it out."
             )
-        return _LEVEL.checked(owner, level) / 2
+        return _LEVEL.known(owner, level) / 2
     if mass is None:
         raise ParameterError(
             f"{owner}: the density of a force, in N²/Hz, needs the mass that it acts on; give mass= in kg."
         )
-    of_force = dataclasses.replace(_LEVEL, unit="kg^2 m^2 s^-3")
-    return of_force.checked(owner, level) / (2 * _MASS.checked(owner, mass) ** 2)
+    of_force = dataclasses.replace(_LEVEL, unit="kg^2 m^2 s^-4 Hz^-1")
+    return of_force.known(owner, level) / (2 * _MASS.known(owner, mass) ** 2)

@@ -27,7 +27,7 @@ class SupportMotion(Excitation):
     """
 
     amplitude: float = parameter("a", "m")
-    frequency: float = parameter("omega", "s^-1", above=0)
+    frequency: float = parameter("omega", "rad s^-1", above=0)
     phase: float = parameter("phi", "rad", default=0.0)
 
     def force(self, t: Any) -> Any:
@@ -58,8 +58,8 @@ class SupportAcceleration(Excitation):
         φ, in rad.
     """
 
-    amplitude: float = parameter("A", "m s^-2")
-    frequency: float = parameter("omega", "s^-1", above=0)
+    amplitude: float = parameter("A", "m s^-2", mass_power=0)
+    frequency: float = parameter("omega", "rad s^-1", above=0)
     phase: float = parameter("phi", "rad", default=0.0)
 
     def force(self, t: Any) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.plots.artists import Artists
 from vibrokit.plots.axes import colour, named, panels_or_new, powers_of_ten, span
-from vibrokit.text_units import length_unit, size_of
+from vibrokit.text_units import length_unit
 
 _PANELS: Mapping[str, str] = {
     "low": "displacement x ({length})",
@@ -73,7 +73,7 @@ def sweep(
     intensity: ArrayLike = 0.0,
     searched: ArrayLike = (),
     label: str,
-    length: str | None = None,
+    length: tuple[str, float] | None = None,
     ax: Any = None,
 ) -> SweepArtists:
     """Draw panels over one parameter: displacement with the stops, push of the stops, ΔU with a line at D, ln τ.
@@ -96,8 +96,8 @@ def sweep(
         Values at which exit paths were searched for, whose energies have full markers.
     label : str
         Of the parameter's axis.
-    length : str, optional
-        Unit of displacements; by default one in which they are read easily.
+    length : tuple of (str, float), optional
+        Unit of displacements and its size (m); by default one in which they are read easily.
     ax : array of Axes, optional
         One for each panel.
 
@@ -112,8 +112,8 @@ def sweep(
     grid = panels_or_new(ax, (len(shown), 1), (8.4, 0.8 + 2.2 * len(shown)))
     panels: dict[str, Axes] = dict(zip(shown, grid[:, 0], strict=True))
     place, curves, first = np.asarray(values, dtype=float), list[Line2D](), panels["low"]
-    length = length or length_unit(span([one.high for one in branches] + [one.low for one in branches])[1])
-    metre = 1.0 / size_of(length, "m")
+    name, size = length or length_unit(span([one.high for one in branches] + [one.low for one in branches])[1])
+    metre = 1.0 / size
     for one in branches:
         curves += _draw_branch(panels, place, one, metre, np.isin(place, searched))
     for number, position in enumerate(stops):
@@ -130,7 +130,7 @@ def sweep(
     cross: dict[str, Any] = {"markersize": 8, "markeredgewidth": 1.6, "label": "_lost"}
     for value, action, branch in lost if "energy" in panels else ():
         ends += panels["energy"].plot(value, action, "x", color=colour(branch), **cross)
-    _label(panels, label, length)
+    _label(panels, label, name)
     _explain(first, ax, drawn, ends)
     return SweepArtists(first, tuple(panels.values()), tuple(curves), tuple(drawn), tuple(ends))
 

@@ -52,7 +52,7 @@ def noise_text(one: Assessment) -> str:
     density, in_g = (one.plausibility.value(measure) for measure in (Measure.PSD, Measure.PSD_G))
     if math.isnan(density):
         return f"noise of intensity D = {one.intensity:g} m² s⁻³"
-    return f"noise with a PSD of {density:.4g} (m/s²)²/Hz = {in_g:.4g} g²/Hz (D = {one.intensity:g} m² s⁻³)"
+    return f"noise with a PSD of {density:.4g} (m/s²)²/Hz = {in_g:.4g} g_n²/Hz (D = {one.intensity:g} m² s⁻³)"
 
 
 def states_blocks(one: Assessment) -> list[Table | Sentences]:

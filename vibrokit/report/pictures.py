@@ -13,7 +13,7 @@ from vibrokit.parts.part import Part
 from vibrokit.plots.artists import inline_svg
 from vibrokit.plots.scene_drawing import scene_drawing
 from vibrokit.report.blocks import Picture
-from vibrokit.report.tables import number
+from vibrokit.report.tables import number, written
 from vibrokit.results.mfet import MFETResult
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
@@ -56,12 +56,12 @@ def _spring_text(osc: Oscillator) -> str:
         return ""
     if osc.stiffness is not None:
         return _value_text("κ", osc.stiffness, "s^-2")
-    return _value_text("ω_n", osc.own_frequency, "s^-1")
+    return _value_text("ω_n", osc.own_frequency, "rad s^-1")
 
 
 def _damper_text(osc: Oscillator) -> str:
     given = osc.damping is not None
-    own = _value_text("c", osc.linear_damping, "s^-1") if given else f"ζ = {osc.damping_ratio:.6g}"
+    own = _value_text("c", osc.linear_damping, "s^-1") if given else _value_text("ζ", osc.damping_ratio or 0.0, "")
     return own if osc.friction is None else f"{own}\n{_part_text(osc.friction)}"
 
 
@@ -109,5 +109,7 @@ def _part_text(part: Part) -> str:
 
 
 def _value_text(symbol: str, value: float, unit: str) -> str:
+    if written(value):
+        return f"{symbol} = {written(value)}"
     other = familiar(value, unit)
     return f"{symbol} = {number(value)} {unit_text(unit)}".rstrip() + (f" ({other})" if other else "")

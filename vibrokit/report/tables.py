@@ -12,6 +12,7 @@ import numpy as np
 from vibrokit.comparison.sensitivities import numbers_in, sensitivities, twins
 from vibrokit.errors import StructureError
 from vibrokit.oscillator import Oscillator
+from vibrokit.quantity import Quantity
 from vibrokit.report.blocks import Table
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
@@ -30,7 +31,9 @@ def input_table(osc: Oscillator) -> Table:
     for path, declared, value in osc.entries:
         unit = "not declared" if declared.unit is None else unit_text(declared.unit) or "1"
         symbol = symbol_text(str(symbols[path])) if path in symbols else ""
-        rows.append((path, symbol, number(value), unit, familiar(value, declared.unit)))
+        rows.append((path, symbol, number(value), unit, written(value) or familiar(value, declared.unit)))
+    if osc.mass is not None:
+        rows.append(("mass", "", number(osc.mass), "kg", written(osc.mass)))
     rows += [(f"barriers.{index}.side", "", one.side, "", "") for index, one in enumerate(osc.barriers)]
     return Table("inputs", "Inputs", ("parameter", "symbol", "value", "unit", "that is"), tuple(rows))
 
@@ -106,7 +109,7 @@ def rate_table(result: Result) -> Table:
 
 def coexistence_table(sweep: Sweep) -> Table:
     """Return from where to where each branch of a sweep exists, a row for each stretch without a gap."""
-    label, scale = sweep.axis(sweep.shown_in)
+    label, scale = sweep.axis()
     rows = tuple((one.name, f"{one.first / scale:.8g}", one.begins, f"{one.last / scale:.8g}", one.ends)
                  for one in sweep.coexistence)  # fmt: skip
     header = ("state", "from", "begins by", "to", "ends by")
@@ -115,7 +118,7 @@ def coexistence_table(sweep: Sweep) -> Table:
 
 def gap_table(sweep: Sweep) -> Table:
     """Return the values at which there is no steady state, a row each with the reason."""
-    label, scale = sweep.axis(sweep.shown_in)
+    label, scale = sweep.axis()
     rows = tuple((f"{value / scale:.8g}", reason) for value, reason in sweep.gaps)
     return Table("gaps", "Values without a steady state", (label, "reason"), rows)
 
@@ -123,7 +126,7 @@ def gap_table(sweep: Sweep) -> Table:
 def along_table(sweep: Sweep) -> Table:
     """Return what each branch of a sweep does at each value, a row each; empty cells where nothing is known."""
     rows: list[tuple[str, ...]] = []
-    label, scale = sweep.axis(sweep.shown_in)
+    label, scale = sweep.axis()
     for name in sweep.names:
         low, high, push = sweep.along(name)
         energy = power = time = np.full(len(low), math.nan)
@@ -145,6 +148,11 @@ def noise_intensity(record: Record) -> float:
 def number(value: Any) -> str:
     """Return the value of a parameter as text."""
     return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def written(value: Any) -> str:
+    """Return the value of a parameter as the user wrote it with a unit; empty if it has none."""
+    return value.text if isinstance(value, Quantity) else ""
 
 
 def _digits(energy: ActivationEnergy) -> int:

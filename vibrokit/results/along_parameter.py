@@ -6,11 +6,12 @@ from abc import ABC
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+from vibrokit.quantity import size_of, unit_in
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.fields import Word
 from vibrokit.results.record import Record
 from vibrokit.results.table import Table
-from vibrokit.text_units import parameter_text, size_of
+from vibrokit.text_units import parameter_text
 
 _PARAMETER = Table(
     "",
@@ -45,12 +46,20 @@ class AlongParameter(Record, ABC):
         return " = ".join(texts)
 
     @property
-    def axis_label(self) -> str:
-        """Label of the parameter's axis, with symbol and unit."""
-        return self.axis()[0]
+    def shown_in(self) -> str | None:
+        """Unit in which the user gave the values, or the parameter in the scene; None for SI base units."""
+        own = self.scene.get("given", {}).get(self.parameter)
+        return self.settings.get("unit") or (unit_in(own) if own else None)
+
+    @property
+    def length_unit(self) -> tuple[str, float] | None:
+        """Unit in which the scene has the position of a stop, and its size (m); None if it has it in SI base units."""
+        texts = (text for path, text in self.scene.get("given", {}).items() if path.endswith(".position"))
+        unit = next(map(unit_in, texts), None)
+        return None if unit is None else (unit, size_of(unit, "m"))
 
     def axis(self, unit: str | None = None) -> tuple[str, float]:
-        """Return the label of the parameter's axis in a unit, and the size of that unit in SI.
+        """Return the label of the parameter's axis in a unit, and the size of that unit in SI; by default `shown_in`.
 
         Raises
         ------
@@ -58,8 +67,9 @@ class AlongParameter(Record, ABC):
             The parameter cannot be shown in this unit.
         """
         symbol = self.symbol if self.factors == {self.parameter: 1.0} else ""
-        label = parameter_text(self.parameters_text, symbol, unit or self.unit)
-        return label, 1.0 if unit is None else size_of(unit, self.unit)
+        shown = unit or self.shown_in
+        label = parameter_text(self.parameters_text, symbol, shown or self.unit)
+        return label, 1.0 if shown is None else size_of(shown, self.unit, self.scene.get("mass"))
 
     def parameter_variables(self) -> dict[str, Any]:
         """Return the arrays that hold the parameter."""

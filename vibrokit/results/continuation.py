@@ -178,10 +178,15 @@ class Continuation(AlongParameter):
     def summary(self) -> Summary:
         """The bifurcations."""
         values = f"{counted(len(self.states), 'value')} of {self.parameter}"
+        values, scale = f"{values} in {self.shown_in}" if self.shown_in else values, self.axis()[1]
         return Summary(
             f"Continuation: {counted(len(self.branches), 'branch', 'branches')} at {values}",
             tuple(
-                (f"{b.kind} {b.side}".strip(), self.branch_names[b.branch], f"{b.value:.8g} ± {b.error:.1g}")
+                (
+                    f"{b.kind} {b.side}".strip(),
+                    self.branch_names[b.branch],
+                    f"{b.value / scale:.8g} ± {b.error / scale:.1g}",
+                )
                 for b in self.bifurcations
             ),
         )
@@ -198,16 +203,17 @@ class Continuation(AlongParameter):
             for x in attractor.points[:, 0]
         ]
         values, x, branches = (np.array(column) for column in (zip(*rows, strict=True) if rows else ([], [], [])))
-        marks = [(found.kind, found.value, float(found.point[0])) for found in self.bifurcations]
-        return bifurcation_diagram(values, x, branches, marks, names=self.branch_names, label=self.axis_label, ax=ax)
+        label, scale = self.axis()
+        marks = [(found.kind, found.value / scale, float(found.point[0])) for found in self.bifurcations]
+        return bifurcation_diagram(values / scale, x, branches, marks, names=self.branch_names, label=label, ax=ax)
 
     @called
     def plot_fractions(self, ax: Any = None) -> FractionArtists:
         """Draw the basin fractions along the parameter; see `vibrokit.plots.bifurcation.basin_fractions`."""
         from vibrokit.plots.bifurcation import basin_fractions
 
-        shares, _ = self.fractions()
-        return basin_fractions(self.values, shares.T, self.branch_names, label=self.axis_label, ax=ax)
+        shares, (label, scale) = self.fractions()[0], self.axis()
+        return basin_fractions(self.values / scale, shares.T, self.branch_names, label=label, ax=ax)
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays with dimensions, coordinates, units and long names."""

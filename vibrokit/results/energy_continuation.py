@@ -144,10 +144,12 @@ class EnergyContinuation(AlongParameter):
     def summary(self) -> Summary:
         """The branches."""
         values = f"{counted(len(self.values), 'value')} of {self.parameter}"
+        values, scale = f"{values} in {self.shown_in}" if self.shown_in else values, self.axis()[1]
         rows = []
         for name, branch in zip(self.names, self.branches, strict=True):
             known = np.isfinite(branch.action)
-            reach = f"{self.values[known].min():g} to {self.values[known].max():g}" if known.any() else "nowhere"
+            at = self.values[known] / scale
+            reach = f"{at.min():g} to {at.max():g}" if known.any() else "nowhere"
             span = f"{branch.action[known].min():.6g} to {branch.action[known].max():.6g} m² s⁻³" if known.any() else ""
             rows.append((name, reach, span))
         count = counted(len(self.branches), "path")
@@ -158,10 +160,10 @@ class EnergyContinuation(AlongParameter):
         """Draw the actions along the parameter; see `vibrokit.plots.bifurcation.energy_curves`."""
         from vibrokit.plots.bifurcation import energy_curves
 
-        sources = list(dict.fromkeys(branch.source for branch in self.branches))
+        sources, (label, scale) = list(dict.fromkeys(branch.source for branch in self.branches)), self.axis()
         return energy_curves(
-            self.values, [branch.action for branch in self.branches], self.names,
-            groups=[sources.index(branch.source) for branch in self.branches], label=self.axis_label, ax=ax,
+            self.values / scale, [branch.action for branch in self.branches], self.names,
+            groups=[sources.index(branch.source) for branch in self.branches], label=label, ax=ax,
         )  # fmt: skip
 
     def to_dataset(self) -> xarray.Dataset:

@@ -133,7 +133,12 @@ def _distance(own: Any, its: Any, extent: Any) -> float:
 def noiseless(scene: Any) -> dict[str, Any]:
     """Return a scene as plain data without its noise intensity."""
     noise = {key: value for key, value in (scene.get("noise") or {}).items() if key != "intensity"}
-    return {**scene, "noise": noise}
+    return {**per_unit_mass(scene), "noise": noise}
+
+
+def per_unit_mass(scene: Any) -> dict[str, Any]:
+    """Return what decides the motion in a scene as plain data: without its mass, and without units it was given in."""
+    return {key: value for key, value in scene.items() if key not in ("mass", "given")}
 
 
 def differences(one: Any, other: Any, path: str = "") -> str:

@@ -96,12 +96,6 @@ class Sweep(AlongParameter):
         return self.states.values
 
     @property
-    def shown_in(self) -> str | None:
-        """Unit in which the user gave the values; None for SI base units."""
-        unit: str | None = self.settings.get("unit")
-        return unit
-
-    @property
     def intensity(self) -> Array:
         """Noise intensity D of the scene at each value (m² s⁻³); 0 without noise."""
         return self._along("noise.intensity", (self.scene.get("noise") or {}).get("intensity", 0.0))
@@ -233,7 +227,7 @@ class Sweep(AlongParameter):
     @property
     def summary(self) -> Summary:
         """From where to where each branch exists."""
-        scale = self.axis(self.shown_in)[1]
+        scale = self.axis()[1]
         rows = tuple(
             (one.name, f"{one.first / scale:.8g} ({one.begins}) to {one.last / scale:.8g} ({one.ends})")
             for one in self.coexistence
@@ -248,8 +242,7 @@ class Sweep(AlongParameter):
         """
         from vibrokit.plots.sweeps import Branch, sweep
 
-        shown_in = self.shown_in if unit is None else unit
-        label, scale = self.axis(shown_in)
+        shown_in, (label, scale) = unit or self.shown_in, self.axis(unit)
         branches = []
         for number, name in enumerate(self.names):
             energy = time = np.full(len(self.values), np.nan)
@@ -261,7 +254,8 @@ class Sweep(AlongParameter):
         lost = [(value / scale, energy, self.names.index(name)) for name, value, energy in self.lost]
         return sweep(
             self.values / scale, branches, stops=self.stops, marks=marks, lost=lost, intensity=self.intensity,
-            searched=self.searched / scale, label=label, length=shown_in if self.unit == "m" else None, ax=ax,
+            searched=self.searched / scale, label=label, ax=ax,
+            length=(shown_in, scale) if shown_in and self.unit == "m" else self.length_unit,
         )  # fmt: skip
 
     @property

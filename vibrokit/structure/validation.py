@@ -17,6 +17,7 @@ from vibrokit.kernels.named import check_stepper, name_of, named_stepper
 from vibrokit.kernels.stepper import Stepper
 from vibrokit.kernels.tasks import check_executor
 from vibrokit.oscillator import Oscillator, check_oscillator, generator_from
+from vibrokit.results.one_scene import per_unit_mass
 from vibrokit.results.region import Region
 from vibrokit.results.structure import Structure
 from vibrokit.scene_file import scene_data
@@ -154,4 +155,5 @@ def check_belongs(osc: Oscillator, structure: Any) -> None:
 
 
 def _without_noise(data: Any) -> str:
-    return json.dumps({name: value for name, value in data.items() if name != "noise"}, sort_keys=True, default=str)
+    kept = {name: value for name, value in per_unit_mass(data).items() if name != "noise"}
+    return json.dumps(kept, sort_keys=True, default=str)

@@ -1,0 +1,233 @@
+"""Parts and scenes whose numbers have units: what a drawing says, divided by the mass in one place."""
+
+import copy
+import json
+import math
+import pickle
+import subprocess
+import sys
+
+import pint
+import pytest
+
+import vibrokit as vk
+from tests.assessment.test_plausibility import TUBE
+from vibrokit.assessment.plausibility import plausibility
+from vibrokit.errors import ParameterError, SceneError
+from vibrokit.parts.parameter import Parameter
+from vibrokit.quantity import Quantity
+from vibrokit.scene_file import scene_data, scene_from_data, scene_text
+
+DRAWING = """mass = "0.35 kg"
+stiffness = "22 kN/m"
+damping_ratio = 0.008
+
+[[barriers]]
+law = { name = "linear", stiffness = "2 MN/m" }
+position = "0.25 mm"
+side = "right"
+
+[[barriers]]
+law = { name = "linear", stiffness = "2 MN/m" }
+position = "-0.25 mm"
+side = "left"
+
+[[excitations]]
+name = "harmonic"
+amplitude = "6 N"
+frequency = "65 Hz"
+phase = 0.0
+
+[noise]
+name = "white"
+intensity = "1e-3 N^2/Hz"
+"""
+
+
+@pytest.fixture
+def tube(tmp_path):
+    (tmp_path / "tube.toml").write_text(DRAWING)
+    return vk.load_scene(tmp_path / "tube.toml")
+
+
+def test_a_scene_as_a_drawing_gives_it_has_the_numbers_of_hand(tube):
+    """Bit for bit."""
+    assert tube.own_frequency == TUBE.natural_frequency
+    assert tube.linear_damping == TUBE.linear_damping
+    own = {"natural_frequency": TUBE.natural_frequency, "stiffness": 22e3 / 0.35}
+    assert own | tube.parameters == own | TUBE.parameters
+    by_hand = {(row.measure, row.subject): row.value for row in plausibility(TUBE).rows}
+    found = {(row.measure, row.subject): row.value for row in plausibility(tube).rows}
+    assert found == pytest.approx(by_hand, rel=1e-12)
+
+
+def test_it_is_saved_as_it_was_given(tube):
+    assert scene_text(tube) == DRAWING
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [
+        lambda osc: scene_from_data(json.loads(json.dumps(scene_data(osc)))),
+        lambda osc: pickle.loads(pickle.dumps(osc)),
+        copy.deepcopy,
+        lambda osc: osc.replace({"barriers.0.position": "0.25 mm"}, damping_ratio=0.008),
+        lambda osc: osc.replace(mass=1.0).replace(mass="350 g"),
+    ],
+)
+def test_the_mass_of_a_copy_divides_what_was_given(tube, copied):
+    found = copied(tube)
+    assert found == tube
+    assert {path: one.text for path, one in found.quantities.items() if path != "mass"} == {
+        path: one.text for path, one in tube.quantities.items() if path != "mass"
+    }
+    heavy = found.replace(mass=0.7)
+    assert heavy.mass == 0.7
+    assert heavy.stiffness == 22e3 / 0.7
+    assert heavy.barriers[0].law.stiffness == 2e6 / 0.7
+    assert heavy.excitations[0].amplitude == 6 / 0.7
+    assert heavy.noise.intensity == 1e-3 / 0.7**2 / 2
+    assert heavy.barriers[0].position == 2.5e-4
+    with pytest.raises(SceneError, match="scene: stiffness is 22 kN/m, which needs the mass"):
+        found.replace(mass=None)
+
+
+def test_plain_numbers_are_per_unit_mass(tube):
+    assert TUBE.replace(mass=0.35) == TUBE
+    assert TUBE.replace(mass=0.35).parameters == TUBE.parameters
+    plain = tube.replace({"excitations.0.amplitude": 5.0})
+    assert plain.replace(mass=2.0).excitations[0].amplitude == 5.0
+    assert "excitations.0.amplitude" not in plain.quantities
+
+
+def test_plain_data_of_a_record_has_numbers_and_texts(tube):
+    data = scene_data(tube)
+    assert data["excitations"][0] == {"name": "harmonic", "amplitude": 6 / 0.35, "frequency": 130 * math.pi, "phase": 0}
+    assert type(data["excitations"][0]["amplitude"]) is float
+    assert data["given"]["excitations.0.amplitude"] == "6 N"
+    assert data["given"]["mass"] == "0.35 kg"
+    assert data["mass"] == 0.35
+    assert "given" not in scene_data(TUBE)
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "words"),
+    [
+        ("excitations.0.amplitude", "7 N", r"excitations\.0\.amplitude is 17\.1\d* and given as '7 N'; give one\.$"),
+        ("excitations.3.amplitude", "6 N", r"'excitations\.3\.amplitude' is given as '6 N' and has no number\.$"),
+        ("weight", "6 N", r"'weight' is given as '6 N' and has no number\.$"),
+        ("excitations.0.amplitude", "6 V", "amplitude must be in m s.-2, or kg m s.-2 with the mass of the scene"),
+    ],
+)
+def test_texts_that_do_not_fit_the_numbers_of_a_record(tube, path, text, words):
+    data = scene_data(tube)
+    with pytest.raises((SceneError, ParameterError), match=words):
+        scene_from_data(data | {"given": data["given"] | {path: text}})
+
+
+def test_a_table_of_texts_that_is_none():
+    with pytest.raises(SceneError, match="given must be a table of texts by path, got 3"):
+        scene_from_data(scene_data(TUBE) | {"given": 3})
+
+
+def test_a_force_waits_for_the_mass():
+    force = vk.Harmonic("6 N", "65 Hz")
+    assert force.amplitude.pending
+    assert repr(force) == "Harmonic(amplitude='6 N', frequency='65 Hz', phase=0.0)"
+    assert pickle.loads(pickle.dumps(force)) == force
+    scene = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, excitations=[force], mass=2.0)
+    assert scene.excitations[0].amplitude == 3.0
+    assert scene.excitations[0].replace(phase=0.1).amplitude == 3.0
+    assert force.amplitude.pending
+    with pytest.raises(SceneError, match=r"^scene: excitations\.0\.amplitude is 6 N, which needs the mass; give the "):
+        vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, excitations=scene.excitations)
+
+
+def test_quantities_of_pint():
+    units = pint.UnitRegistry()
+    law = vk.Hertz(3 * units.GN / units.m**1.5)
+    scene = vk.Oscillator(
+        natural_frequency=units.Quantity(40, "Hz"), damping_ratio=0.1, mass=2 * units.kg,
+        barriers=[vk.Barrier(law, 0.5 * units.mm, "right")], excitations=[vk.Constant(3 * units.N)],
+    )  # fmt: skip
+    assert scene.parameters == {
+        "natural_frequency": 80 * math.pi, "damping_ratio": 0.1, "barriers.0.position": 5e-4,
+        "barriers.0.law.stiffness": 1.5e9, "excitations.0.force": 1.5,
+    }  # fmt: skip
+    assert scene.quantities["excitations.0.force"].text == "3 N"
+
+
+def test_damping_of_the_scene():
+    scene = vk.Oscillator(mass="2 kg", stiffness="8 N/m", damping="3 N s/m")
+    assert (scene.own_frequency, scene.linear_damping) == (2.0, 1.5)
+    assert vk.Oscillator(natural_frequency=1.0, damping="3 s^-1").linear_damping == 3.0
+
+
+def test_damping_in_newton_seconds_is_divided_where_it_is_declared():
+    class Dashpot(vk.Spring):
+        stiffness: float = vk.parameter("k", "s^-2")
+        damping: float = vk.parameter("c", "s^-1", mass_power=1)
+        rate: float = vk.parameter("r", "s^-1", default=1.0)
+
+        def force(self, x, v):
+            return self.stiffness * x + self.damping * v
+
+    scene = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, spring=Dashpot("4 kN/m", "6 N s/m"), mass=2)
+    assert (scene.spring.stiffness, scene.spring.damping) == (2e3, 3.0)
+    with pytest.raises(ParameterError, match=r"^Dashpot: rate must be in s\^-1, got '6 N s/m'"):
+        Dashpot(1.0, 1.0, "6 N s/m")
+
+
+def test_what_is_computed_before_the_mass_is_known_is_refused():
+    stiffness = Parameter("stiffness", "stiffness", "k", "s^-2", minimum=0)
+    assert stiffness.known("Law.from_restitution", "9 s^-2") == 9.0
+    assert type(stiffness.known("Law.from_restitution", 9.0)) is float
+    with pytest.raises(ParameterError, match=r"^Law: stiffness is 2 MN/m and is computed with before a scene gives"):
+        stiffness.known("Law", "2 MN/m")
+
+
+def test_structural_parameters_are_plain():
+    class Power(vk.ContactLaw):
+        stiffness: float = vk.parameter("k", "s^-2")
+        exponent: float = vk.parameter("n", "", structural=True)
+
+        def force(self, depth, rate):
+            return self.stiffness * depth**self.exponent
+
+    assert type(Power(1.0, "150 %").exponent) is float
+    assert type(Power(1.0, 1.5).exponent) is float
+
+
+def test_no_unit_no_pint():
+    code = (
+        "import sys, vibrokit as vk\n"
+        "osc = vk.load_scene('hertz-0.570').replace(damping_ratio=0.02, mass=2.0)\n"
+        "assert len(osc.model.drift) == 2\n"
+        "assert 'pint' not in sys.modules\n"
+        "vk.Harmonic('1 N', 1.0)\n"
+        "assert 'pint' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_motion_is_that_of_plain_numbers(tube):
+    plain = TUBE.replace(natural_frequency=None, stiffness=22e3 / 0.35)
+    assert tube == plain
+    assert isinstance(tube.excitations[0].amplitude, Quantity)
+    assert (tube.section_map([[1e-4, 0.01]]) == plain.section_map([[1e-4, 0.01]])).all()
+
+
+def test_levels_of_spectra():
+    """0.04 g²/Hz are D = 0.02 g²."""
+    expected = vk.WhiteNoise(0.02 * 9.80665**2)
+    for noise in (vk.WhiteNoise.from_psd("0.04 g_n^2/Hz"), vk.WhiteNoise("0.04 g_n^2/Hz")):
+        assert noise.intensity == pytest.approx(expected.intensity, rel=1e-15)
+    assert vk.WhiteNoise.from_psd("1e-3 N^2/Hz", of="force", mass="500 g").intensity == 2e-3
+    with pytest.raises(ParameterError, match=r"^WhiteNoise\.from_psd: level is 1e-3 N\^2/Hz and is computed with"):
+        vk.WhiteNoise.from_psd("1e-3 N^2/Hz")
+
+
+def test_the_acceleration_of_a_support_is_not_divided_by_the_mass():
+    assert vk.SupportAcceleration("2 g_n", "50 Hz").amplitude == 2 * 9.80665
+    with pytest.raises(ParameterError, match=r"amplitude must be in m s\^-2, got '2 N', which is in kg m s\^-2"):
+        vk.SupportAcceleration("2 N", "50 Hz")
