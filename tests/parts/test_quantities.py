@@ -231,3 +231,40 @@ def test_the_acceleration_of_a_support_is_not_divided_by_the_mass():
     assert vk.SupportAcceleration("2 g_n", "50 Hz").amplitude == 2 * 9.80665
     with pytest.raises(ParameterError, match=r"amplitude must be in m s\^-2, got '2 N', which is in kg m s\^-2"):
         vk.SupportAcceleration("2 N", "50 Hz")
+
+
+def test_every_number_of_a_periodic_force_may_have_a_unit():
+    """Fourier coefficients are constants of the part, not fields."""
+    force = vk.Periodic("65 Hz", "1 N", c_1="6 N", s_3="500 mN", s_1=0.25)
+    scene = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, excitations=[force], mass="0.5 kg")
+    assert scene.excitations[0] == vk.Periodic(130 * math.pi, 2.0, c_1=12.0, s_3=1.0, s_1=0.25)
+    assert scene.replace(mass=1.0).excitations[0] == vk.Periodic(130 * math.pi, 1.0, c_1=6.0, s_3=0.5, s_1=0.25)
+
+
+@pytest.mark.parametrize(
+    ("part", "plain"),
+    [
+        (vk.Chirp("6 N", "10 Hz", "20 Hz", "2 ms"), vk.Chirp(12.0, 20 * math.pi, 40 * math.pi, 0.002)),
+        (vk.PulseTrain("3 N s", "1 s", "10 ms"), vk.PulseTrain(6.0, 1.0, 0.01)),
+        (vk.ParametricStiffness("2 N/m", "5 Hz"), vk.ParametricStiffness(4.0, 10 * math.pi)),
+    ],
+)
+def test_excitations_in_the_units_of_a_drawing(part, plain):
+    scene = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1, excitations=[part], mass="0.5 kg")
+    assert scene.excitations == (plain,)
+
+
+def test_a_dash_pot_and_a_corner_frequency():
+    law = vk.KelvinVoigt("2 N/m", "3 N s/m")
+    scene = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.1, barriers=[vk.Barrier(law, "1 mm", "right")], mass="0.5 kg",
+        noise=vk.ColouredNoise("1e-3 N^2/Hz", "5 Hz"),
+    )  # fmt: skip
+    assert scene.barriers[0].law == vk.KelvinVoigt(4.0, 6.0)
+    assert scene.noise == vk.ColouredNoise(1e-3 / 0.5**2 / 2, 10 * math.pi)
+
+
+def test_a_restitution_is_not_computed_from_a_force_without_a_mass():
+    with pytest.raises(ParameterError, match="stiffness is 2 kN/m and is computed with before a scene gives the mass"):
+        vk.KelvinVoigt.from_restitution(0.5, "2 kN/m")
+    assert vk.KelvinVoigt.from_restitution(0.5, "4 1/s^2") == vk.KelvinVoigt.from_restitution(0.5, 4.0)

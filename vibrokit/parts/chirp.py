@@ -31,8 +31,8 @@ class Chirp(Excitation):
     """
 
     amplitude: float = parameter("f", "m s^-2")
-    start_frequency: float = parameter("omega_0", "s^-1", minimum=0)
-    end_frequency: float = parameter("omega_1", "s^-1", minimum=0)
+    start_frequency: float = parameter("omega_0", "rad s^-1", minimum=0)
+    end_frequency: float = parameter("omega_1", "rad s^-1", minimum=0)
     duration: float = parameter("D", "s", above=0)
     phase: float = parameter("phi", "rad", default=0.0)
 

@@ -26,7 +26,7 @@ class ColouredNoise(StationaryNoise):
 
     extra_states: ClassVar[tuple[str, ...]] = ("y",)
 
-    rate: float = parameter("lambda", "s^-1", above=0)
+    rate: float = parameter("lambda", "rad s^-1", above=0)
 
     def amplitude(self, x: Any, v: Any) -> Any:
         """Factor before √D dW in y: λ."""

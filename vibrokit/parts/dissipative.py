@@ -28,7 +28,7 @@ class KelvinVoigt(ContactLaw):
     """
 
     stiffness: float = parameter("k", "s^-2", minimum=0)
-    damping: float = parameter("c", "s^-1", minimum=0)
+    damping: float = parameter("c", "s^-1", minimum=0, mass_power=1)
 
     def force(self, depth: Any, rate: Any) -> Any:
         """Force on the mass: k δ + c δ′."""

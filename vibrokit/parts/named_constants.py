@@ -34,6 +34,10 @@ class NamedConstants:
         constants = dict(self.constants)
         return constants[declared.name] if declared.name in constants else getattr(self, declared.attribute)
 
+    def _stored(self) -> dict[str, Any]:
+        """What the fields hold, by the name of each parameter."""
+        return {declared.name: getattr(self, declared.attribute) for declared in self._own()} | dict(self.constants)
+
     def twin(self, values: Mapping[str, Any]) -> Self:
         """Return an unchecked copy whose parameters are `values` by name."""
         twin = object.__new__(type(self))

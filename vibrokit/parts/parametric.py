@@ -28,7 +28,7 @@ class ParametricStiffness(Excitation):
     """
 
     stiffness: float = parameter("kappa", "s^-2")
-    frequency: float = parameter("omega", "s^-1", above=0)
+    frequency: float = parameter("omega", "rad s^-1", above=0)
     phase: float = parameter("phi", "rad", default=0.0)
 
     def force(self, t: Any, x: Any, v: Any) -> Any:

@@ -109,8 +109,11 @@ class Part(ABC, metaclass=Constructed):
     @property
     def quantities(self) -> dict[str, Quantity]:
         """Parameter values that were given with a unit, by name."""
-        values = ((declared.name, getattr(self, declared.attribute)) for declared in self._declared)
-        return {name: value for name, value in values if isinstance(value, Quantity)}
+        return {name: value for name, value in self._stored().items() if isinstance(value, Quantity)}
+
+    def _stored(self) -> dict[str, Any]:
+        """What the fields hold, by the name of each parameter; `parameters` needs SymPy for other people's parts."""
+        return {declared.name: getattr(self, declared.attribute) for declared in self._declared}
 
     def of_mass(self, mass: float | None) -> Self:
         """Return the part in a scene of a mass (kg): forces that were given with units are divided by it."""

@@ -36,7 +36,7 @@ class Periodic(NamedConstants, Excitation):
     Periodic(frequency=0.57, mean=0.0, c_1=0.18, s_3=0.02)
     """
 
-    frequency: float = parameter("omega", "s^-1", above=0)
+    frequency: float = parameter("omega", "rad s^-1", above=0)
     mean: float = parameter("c_0", "m s^-2")
     constants: tuple[tuple[str, Any], ...]
 

@@ -32,7 +32,7 @@ class PulseTrain(Excitation):
         t_0: time at which one pulse begins, in s.
     """
 
-    impulse: float = parameter("J", "m s^-1")
+    impulse: float = parameter("J", "m s^-1", mass_power=1)
     repeat: float = parameter("T", "s", above=0, name="period")
     width: float = parameter("w", "s", above=0)
     rise: float = parameter("r", "s", minimum=0, default=0.0)

@@ -16,17 +16,17 @@ _SPEED = Parameter("speed", "speed", "v_0", "m s^-1", above=0)
 
 def restitution(owner: str, value: Any) -> float:
     """Return a coefficient of restitution; raise ParameterError if it is not in (0, 1]."""
-    return _RESTITUTION.checked(owner, value)
+    return _RESTITUTION.known(owner, value)
 
 
 def impact_speed(owner: str, value: Any) -> float:
     """Return a speed of impact (m s⁻¹); raise ParameterError if it is not positive."""
-    return _SPEED.checked(owner, value)
+    return _SPEED.known(owner, value)
 
 
 def elastic(owner: str, declared: Parameter, value: Any) -> float:
     """Return a stiffness that drives the mass back, so that there is a restitution; raise ParameterError for 0."""
-    return dataclasses.replace(declared, minimum=None, above=0).checked(owner, value)
+    return dataclasses.replace(declared, minimum=None, above=0).known(owner, value)
 
 
 def crossing(function: Callable[[float], float], low: float, high: float) -> float:
