@@ -78,6 +78,7 @@ class KelvinVoigt(ContactLaw):
 
 # With ζ = c/(2√k), δ″ + 2ζ√k δ′ + kδ = 0 leaves δ = 0 at exp(−πζ/√(1 − ζ²)) times the speed at which it came, if
 # ζ < 1; and 2ζ√k δ′ + kδ = 0 at exp(−2ζ acos ζ/√(1 − ζ²)) times that, which for ζ > 1 is exp(−2ζ acosh ζ/√(ζ² − 1)).
+# The second is that of Schwager and Pöschel, *Granular Matter* 9 (2007) 465, with acos ζ in place of an arc tangent.
 
 
 def _loss(ratio: float) -> float:
