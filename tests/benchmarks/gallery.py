@@ -65,7 +65,7 @@ forced("linear stops", 0.57, 0.18, damping=0.01, push=0.2, stops=both(vk.Linear(
 forced("two linear stops", 1.3, 0.25, damping=0.03, stops=both(vk.Linear(200.0), 0.25))
 forced("hunt-crossley", 0.57, 0.18, damping=0.01, push=0.2,
        stops=both(vk.CustomLaw("k*depth**1.5*(1 + c*rate)", k=50.0, c=0.3), 0.5))  # fmt: skip
-forced("kelvin-voigt", 0.75, 0.2, damping=0.02, stops=both(vk.CustomLaw("k*depth + c*rate", k=100.0, c=1.0), 0.4))
+forced("kelvin-voigt", 0.75, 0.2, damping=0.02, stops=both(vk.KelvinVoigt(100.0, 1.0), 0.4))
 forced("one stop, hard", 1.3, 0.2, damping=0.03, stops=(vk.Barrier(vk.Hertz(100.0), 0.5, "right"),))
 forced("two tones", 0.6, 0.2, damping=0.03, stops=both(vk.Hertz(30.0), 0.6), more=(vk.Harmonic(0.05, 1.2),))
 forced("zero gap", 2.0, 0.3, damping=0.03, stops=(vk.Barrier(vk.Linear(3.0), 0.0, "right"),))

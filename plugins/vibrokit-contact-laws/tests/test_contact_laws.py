@@ -65,6 +65,13 @@ def test_rebounds_as_stated(law):
     assert law(0.0, 0.7, 0.5).rebound() == 0
 
 
+def test_half_the_factor_of_hu_and_guo_rebounds_as_stated():
+    """What some public programs have."""
+    stated = (0.947, 0.823, 0.663, 0.446)
+    assert [by_lambert(0.75 * (1 - e) / e) for e in NOMINAL] == pytest.approx(stated, abs=6e-4)
+    assert ", ".join(f"{one:.3f}" for one in stated) in HuGuo.__doc__
+
+
 @pytest.mark.parametrize(("law", "share"), [(Flores, 16 / 15), (Gonthier, 4 / 3), (LeeWang, 1 / 2)])
 def test_share_of_the_loss_that_is_lost_near_1(law, share):
     """For small a the loss 1 − ε is 2/3 a, to first order; a law without fault has a = 3/2 (1 − e) there."""
