@@ -107,6 +107,12 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert "Wave, an excitation, fails 1 of " in printed
         assert "but its force repeats after 1/2 of it" in printed
         assert "FAILED" not in printed
+    elif page.stem == "excitation":
+        assert (made["found"].harmonics, made["found"].periods) == (3, 4)
+        assert float(printed.split()[0]) == pytest.approx(3.0, abs=1e-6)
+        assert "42/59 (off by 1.0e-04, a section of 0.6462 s)\n" in printed
+        assert "never repeats, so there is no section" in printed
+        assert "FAILED" not in printed
     elif page.stem == "steppers":
         assert "RK4: steps must be a whole number from 1 to 10000000, got 0." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)
