@@ -96,6 +96,13 @@ def test_coefficients_in_a_scene_file_and_by_path(tmp_path):
     assert osc.replace(c_2=0.06).excitations[0] == vk.Periodic(0.6, s_10=-0.1, c_2=0.06)
 
 
+def test_coefficients_with_units_are_divided_by_the_mass():
+    part = vk.Periodic("0.1 Hz", c_1="0.5 N", s_2="3 m/s^2")
+    osc = vk.Oscillator(mass="0.25 kg", stiffness="0.25 N/m", damping_ratio=0.1, excitations=[part])
+    found = osc.excitations[0].parameters
+    assert found == pytest.approx({"frequency": 0.2 * math.pi, "mean": 0.0, "c_1": 2.0, "s_2": 3.0}, rel=1e-14)
+
+
 LINE = np.linspace(0.0, PERIOD, 65)
 
 
@@ -110,7 +117,7 @@ LINE = np.linspace(0.0, PERIOD, 65)
         ({"t": LINE[::-1]}, "times must rise, got .* after 2.5"),
         ({"period": 1.9}, "no whole number of periods of 1.9 s, but 1.316 of them"),
         ({"period": 2 * PERIOD}, "no whole number of periods of 5 s, but 0.5 of them"),
-        ({"period": 0.0}, "period must be a finite number greater than 0, got 0.0"),
+        ({"period": 0.0}, "period must be a finite number greater than 0, got 0"),
         ({"period": PERIOD / 2}, "harmonics, as many as 65 samples allow, leave out .* check the period, 1.25 s"),
         ({"f": LINE}, "the ends do not match: the force would change by 2.5"),
         ({"f": np.sign(np.sin(2 * math.pi / PERIOD * LINE))}, "leave out .* more than error = 0.01"),

@@ -123,8 +123,16 @@ def test_a_free_mass_gains_the_impulse_of_each_pulse(width, rise):
 def test_pulses_are_as_high_as_their_impulse_says():
     train = vk.PulseTrain.of_height(50.0, period=2.0, width=0.3, rise=0.1, delay=0.2)
     assert train == vk.PulseTrain(15.0, 2.0, 0.3, 0.1, 0.2)
+    assert vk.PulseTrain.of_height("50 m/s^2", "2 s", "300 ms", 0.1, 0.2) == train
     times = [0.1, 0.25, 0.35, 0.45, 0.55, 0.7, 2.25, -1.75]  # before, half up, on top, half down, after, a period on
     assert [float(train.force(t)) for t in times] == pytest.approx([0, 25, 50, 50, 25, 0, 25, 25], abs=1e-9)
+
+
+def test_an_impulse_in_newton_seconds_is_divided_by_the_mass():
+    train = vk.PulseTrain("4 mN s", "20 ms", "1 ms")
+    osc = vk.Oscillator(mass="0.5 kg", stiffness="200 N/m", damping_ratio=0.1, excitations=[train])
+    assert osc.parameters["excitations.0.impulse"] == pytest.approx(0.008, rel=1e-14)
+    assert osc.period == pytest.approx(0.02, rel=1e-14)
 
 
 @pytest.mark.parametrize(

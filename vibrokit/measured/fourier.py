@@ -87,7 +87,7 @@ class _Record:
 
 
 @called
-def fitted_series(make: Callable[..., Any], t: Any, f: Any, error: Any, period: Any) -> PeriodicEstimate:
+def fitted_series(make: Callable[..., Any], t: Any, f: Any, error: Any, period: float | None) -> PeriodicEstimate:
     """Return the shortest series that leaves out at most `error` of a record; raises ParameterError if none does.
 
     `make` makes the excitation of its frequency, its mean, and the coefficients by name.
@@ -124,15 +124,13 @@ def fitted_series(make: Callable[..., Any], t: Any, f: Any, error: Any, period: 
     )
 
 
-def _record(t: Any, f: Any, period: Any) -> _Record:
+def _record(t: Any, f: Any, period: float | None) -> _Record:
     times, force = _checked(t, f)
     steps, span = np.diff(times), float(times[-1] - times[0])
     if period is None:
         length, periods = span, 1
     else:
-        length = real(period)
-        if not 0 < length < math.inf:
-            raise ParameterError(f"Periodic: period must be a finite number greater than 0, got {shown(period)}.")
+        length = float(period)
         periods = max(1, round(span / length))
         if abs(periods * length - span) > (1 + _ROUNDING) * steps.max():
             raise ParameterError(

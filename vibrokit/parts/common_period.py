@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from vibrokit.arguments import real
 from vibrokit.construction import called
-from vibrokit.errors import NoSectionError, ParameterError, shown
+from vibrokit.errors import NoSectionError, ParameterError
+from vibrokit.parts.parameter import Parameter
 
 MOST_CYCLES = 1000
 """Of the slowest excitation in a common period, and of any other in one cycle of the slowest."""
+_FREQUENCY = Parameter("frequency", "frequency", "omega", "rad s^-1", above=0)
 _SAME = 1e-12  # relative difference of equal ratios
 _OFFERED = (1e-2, 1e-3, 1e-4)  # errors, for each of which the shortest section is offered
 
@@ -52,7 +53,7 @@ def common_ratios(first: float, second: float) -> tuple[Ratio, ...]:
     Parameters
     ----------
     first, second : float
-        Frequencies in rad s⁻¹, positive, in any order.
+        Frequencies in rad s⁻¹, or with their unit (``"65 Hz"``), positive, in any order.
 
     Returns
     -------
@@ -68,19 +69,12 @@ def common_ratios(first: float, second: float) -> tuple[Ratio, ...]:
     >>> print(common_ratios(2 * math.pi * 65.0, 2 * math.pi * 91.3)[3])
     5/7 (off by 3.3e-03, a section of 0.07692 s)
     """
-    slow, fast = sorted(_positive(value) for value in (first, second))
+    slow, fast = sorted(_FREQUENCY.known("common_ratios", value) for value in (first, second))
     if fast > MOST_CYCLES * slow:
         raise ParameterError(
             f"common_ratios: one frequency may be at most {MOST_CYCLES} times the other, got {slow:g} and {fast:g}."
         )
     return _ratios(2 * math.pi / slow, 2 * math.pi / fast)
-
-
-def _positive(value: object) -> float:
-    number = real(value)
-    if not 0 < number < math.inf:
-        raise ParameterError(f"common_ratios: a frequency must be a finite number greater than 0, got {shown(value)}.")
-    return number
 
 
 @functools.lru_cache(maxsize=256)

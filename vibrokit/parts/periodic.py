@@ -15,6 +15,7 @@ from vibrokit.parts.parameter import Parameter, parameter
 if TYPE_CHECKING:
     from vibrokit.measured.fourier import PeriodicEstimate
 
+_PERIOD = Parameter("period", "period", "T", "s", above=0)
 _NAME = re.compile(r"([cs])_([1-9]\d?|100)")
 
 
@@ -80,7 +81,8 @@ class Periodic(NamedConstants, Excitation):
         """
         from vibrokit.measured.fourier import fitted_series
 
-        return fitted_series(cls, t, f, error, period)
+        length = None if period is None else _PERIOD.known("Periodic", period)
+        return fitted_series(cls, t, f, error, length)
 
     def force(self, t: Any) -> Any:
         """Force at time t: the series."""

@@ -7,9 +7,10 @@ from typing import Any, Self
 from vibrokit.errors import ParameterError
 from vibrokit.parts.excitation import Excitation
 from vibrokit.parts.functions import Max, Min, Mod
-from vibrokit.parts.parameter import parameter
+from vibrokit.parts.parameter import Parameter, parameter
 
 _SHORTEST = 1 / 30_000  # of a period: steps are not made for shorter pulses
+_HEIGHT = Parameter("height", "height", "h", "m s^-2")
 _NO_TIME = 1e-90  # so that an edge without duration divides by no zero
 
 
@@ -55,7 +56,8 @@ class PulseTrain(Excitation):
     @classmethod
     def of_height(cls, height: float, period: float, width: float, rise: float = 0.0, delay: float = 0.0) -> Self:
         """Return a train of pulses of a height (m s⁻²), whose impulse is height times width."""
-        return cls(height * width, period, width, rise, delay)
+        duration = next(one for one in cls._declared if one.name == "width").known("PulseTrain", width)
+        return cls(_HEIGHT.known("PulseTrain", height) * duration, period, width, rise, delay)
 
     def force(self, t: Any) -> Any:
         """Force at time t: up to J/w and back in every period."""
