@@ -73,6 +73,26 @@ def test_the_first_contact_of_a_forced_linear_oscillator():
     )
 
 
+def test_a_scene_given_by_stiffness_and_damping():
+    """ΔU = cκ (b − f/κ)², the energy above with κ = ω_n² and c = 2ζω_n, by the numbers that the scene has."""
+    stiffness, c, b, push = 1.7, 0.3, 0.5, 0.1
+    osc = vk.Oscillator(
+        stiffness=stiffness, damping=c, barriers=(vk.Barrier(vk.Hertz(50.0), b, "right"),),
+        excitations=(vk.Constant(push),), noise=vk.WhiteNoise(1e-3),
+    )  # fmt: skip
+    energy, gap = least(osc, "rest", exit=vk.FirstContact()), b - push / stiffness
+    assert energy.value == pytest.approx(c * stiffness * gap**2, rel=1e-9)
+    check(
+        energy,
+        {
+            "stiffness": c * gap**2 + 2 * c * gap * push / stiffness,
+            "damping": stiffness * gap**2,
+            "barriers.0.position": 2 * c * stiffness * gap,
+            "excitations.0.force": -2 * c * gap,
+        },
+    )
+
+
 @pytest.fixture(scope="module")
 def hertz():
     osc = vk.load_scene("hertz-0.570")

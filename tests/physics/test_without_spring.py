@@ -7,7 +7,7 @@ import pytest
 
 import vibrokit as vk
 from vibrokit.analyzers.sgcm.density_grid import DensityGrid
-from vibrokit.errors import StructureError
+from vibrokit.errors import ParameterError, StructureError
 from vibrokit.results.codes import Code
 from vibrokit.results.region import Region
 
@@ -110,6 +110,20 @@ class TestRest:
             StructureError, match=r"^no force of the scene depends on x, so that nothing holds .*stops\.$"
         ):
             vk.find_structure(osc)
+
+    def test_a_frequency_of_0_cannot_be_followed(self):
+        with pytest.raises(
+            ParameterError, match=r"natural_frequency shapes the equations, so motion cannot be followed"
+        ):
+            vk.continuation(mass(barriers=stops(200.0)), "natural_frequency", [0.1, 0.2])
+
+    @pytest.mark.slow
+    def test_a_spring_that_grows_from_nothing(self):
+        """κ x + k (x − b) = f in contact: x = (f + kb)/(κ + k), from κ = 0 on."""
+        pressed = mass(vk.Constant(2.0), natural_frequency=None, stiffness=0, barriers=stops(200.0))
+        traced = vk.continuation(pressed, "stiffness", [0.0, 0.5, 1.0], region=((-0.8, 0.8), (-4, 4)))
+        for kappa, one in zip([0.0, 0.5, 1.0], traced.states, strict=True):
+            assert one.attractors[0].points[0, 0] == pytest.approx((2.0 + 200.0 * 0.6) / (kappa + 200.0), rel=1e-9)
 
     @pytest.mark.parametrize("excitations", [(), (vk.Harmonic(0.5, 2 * math.pi),)], ids=["rest", "shaken"])
     def test_a_mass_in_a_gap(self, excitations):
