@@ -113,6 +113,12 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert "42/59 (off by 1.0e-04, a section of 0.6462 s)\n" in printed
         assert "never repeats, so there is no section" in printed
         assert "FAILED" not in printed
+    elif page.stem == "noise":
+        assert printed.splitlines()[0].split() == [str(0.25 / (2 * 0.35**2)), str(0.25 / 0.35**2)]
+        assert made["e"].value == pytest.approx(0.110753, abs=1e-6)
+        assert made["e"].lower == pytest.approx(0.1, rel=1e-6)
+        assert made["estimate"].noise.rate == pytest.approx(3.0, abs=4 * made["estimate"].standard_errors["rate"])
+        assert made["osc"].noise == made["estimate"].noise
     elif page.stem == "steppers":
         assert "RK4: steps must be a whole number from 1 to 10000000, got 0." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)

@@ -35,6 +35,7 @@ _PER_AVERAGE = 1 / (1 + 2 / 36)
 _SHARED = 1 + 2 * ((2 / 3) ** 2 + (1 / 6) ** 2)
 _FAINT = 1 / 30  # of the largest density of a model: where it is less, an instrument's own noise may be more
 _STARTS = 24  # rates, over the frequencies used
+_RATES = ("rad s^-1", "s^-1")
 _RATIOS = np.geomspace(0.003, 3.0, 7)
 
 Array = NDArray[np.float64]
@@ -164,7 +165,7 @@ def fitted_noise(cls: Any, t: Any, a: Any) -> NoiseEstimate:
 def _tried(spectrum: _Spectrum, declared: Sequence[Any]) -> list[Array]:
     """Values of each parameter from which the best fit is looked for."""
     low, high = 2 * math.pi * spectrum.frequencies[[0, -1]]
-    return [np.geomspace(low, high, _STARTS) if one.unit == "rad s^-1" else _RATIOS for one in declared]
+    return [np.geomspace(low, high, _STARTS) if one.unit in _RATES else _RATIOS for one in declared]
 
 
 def _best_start(spectrum: _Spectrum, declared: Sequence[Any]) -> Array:
@@ -187,7 +188,7 @@ def _check_inside(owner: str, spectrum: _Spectrum, declared: Sequence[Any], shap
     """Refuse rates at an end of the frequencies of the record."""
     low, high = 2 * math.pi * spectrum.frequencies[[0, -1]]
     for one, value in zip(declared, shape, strict=True):
-        if one.unit == "rad s^-1" and not low < value < high:
+        if one.unit in _RATES and not low < value < high:
             raise ParameterError(
                 f"{owner}: the record does not tell the {one.name}: its spectrum from {low:.4g} to {high:.4g} rad/s "
                 f"fits best with {value:.4g}; take a longer record, shorter steps, or another model."

@@ -152,6 +152,6 @@ def checked_noise(osc: Oscillator, needs_intensity: bool = True) -> NoiseModel:
         raise SceneError(
             f"the noise has {counted(extra, 'state')} of its own, so that a density needs {2 + extra} "
             f"dimensions: with 100 nodes in each, {100 ** (2 + extra) * 8 / 2**30:.3g} GiB. Densities are computed in "
-            "x and v only; use ActionPlot or LeastAction."
+            "x and v only; use LeastAction or MFET."
         )
     return osc.noise
