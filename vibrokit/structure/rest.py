@@ -58,7 +58,8 @@ class SteadyForce:
 
     def _mean(self, function: Callable[[Array, Array], Array], states: Array) -> Array:
         """The mean over the times of a function of states and times."""
-        many = np.broadcast_to(states_at(self.osc, states), (len(self._times), *states.shape))
+        full = states_at(self.osc, states)
+        many = np.broadcast_to(full, (len(self._times), *full.shape))
         times = self._times.reshape(-1, *[1] * (states.ndim - 1))
         return np.asarray(function(many, times).mean(axis=0))
 
