@@ -3,7 +3,7 @@
 import math
 from typing import ClassVar
 
-from sympy import Mod, Piecewise, Rational, pi
+from sympy import Mod, Piecewise, Rational, cos, pi
 
 import vibrokit as vk
 
@@ -51,7 +51,41 @@ class TooShortABlow(vk.Excitation):
         return self.repeat
 
 
-EXCITATIONS = [("period", TwiceThePeriod), ("period", JumpsTooEarly), ("motion", TooShortABlow)]
+class VariesFaster(vk.Excitation):
+    """A stiffness that varies twice in what it says is its period."""
+
+    stiffness: float = vk.parameter("kappa", "s^-2", above=0)
+    frequency: float = vk.parameter("omega", "s^-1", above=0)
+
+    def force(self, t, x, v):
+        return -self.stiffness * cos(2 * self.frequency * t) * x
+
+    @property
+    def period(self):
+        return 2 * math.pi / self.frequency
+
+
+class VariesSlower(vk.Excitation):
+    """A stiffness that has not yet repeated after what it says is its period."""
+
+    stiffness: float = vk.parameter("kappa", "s^-2", above=0)
+    frequency: float = vk.parameter("omega", "s^-1", above=0)
+
+    def force(self, t, x, v):
+        return -self.stiffness * cos(self.frequency * t / 2) * x**3
+
+    @property
+    def period(self):
+        return 2 * math.pi / self.frequency
+
+
+EXCITATIONS = [
+    ("period", VariesFaster),
+    ("period", VariesSlower),
+    ("period", TwiceThePeriod),
+    ("period", JumpsTooEarly),
+    ("motion", TooShortABlow),
+]
 
 
 class SquareWave(vk.Excitation):

@@ -6,7 +6,7 @@ import pytest
 import sympy
 
 from tests.conformance import broken, broken_forcing
-from vibrokit import Constant, CubicSpring, DryFriction, Hertz, WhiteNoise
+from vibrokit import Constant, CubicSpring, DryFriction, Harmonic, Hertz, ParametricStiffness, WhiteNoise
 from vibrokit.errors import UnknownNameError
 from vibrokit.kernels import kernel, store
 from vibrokit.symbolic import equations
@@ -102,7 +102,14 @@ def test_wrong_code_is_caught(checks, part, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("checks", "part"), [(contact_law_checks, Hertz), (spring_checks, CubicSpring), (friction_checks, DryFriction)]
+    ("checks", "part"),
+    [
+        (contact_law_checks, Hertz),
+        (spring_checks, CubicSpring),
+        (friction_checks, DryFriction),
+        (excitation_checks, Harmonic),
+        (excitation_checks, ParametricStiffness),
+    ],
 )
 def test_a_wrong_motion_is_caught(checks, part, monkeypatch):
     """The motion is that of the formula, so that here another formula is the reference."""
