@@ -63,6 +63,7 @@ from .parts.spring import CubicSpring as CubicSpring
 from .parts.spring import CustomSpring as CustomSpring
 from .parts.spring import LinearSpring as LinearSpring
 from .parts.spring import Spring as Spring
+from .parts.support import SpringSupportMotion as SpringSupportMotion
 from .parts.support import SupportAcceleration as SupportAcceleration
 from .parts.support import SupportMotion as SupportMotion
 from .report.report import Report as Report

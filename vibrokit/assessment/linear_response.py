@@ -69,12 +69,12 @@ def linear_response(osc: Oscillator) -> LinearResponse | None:
 
 def _tones(osc: Oscillator, rest: float = 0.0) -> tuple[list[Tone], float]:
     """Tones of the excitations at a rest, and the sum of the means of those of time alone, without constants."""
-    found, mean = list[Tone](), 0.0
+    found, mean, modulated = list[Tone](), 0.0, osc.model.in_time.modulated
     for index, part in enumerate(osc.excitations):
         if part.period is not None and math.isfinite(part.period):
             # At most 63 tones of each, none below 1e-9 of the largest.
             own, more = tones(excitation_of(osc.model, index, rest), part.period, 63, 1e-9)
-            found, mean = found + more, mean + (0.0 if part.depends_on_state else own)
+            found, mean = found + more, mean + (0.0 if part.depends_on_state and modulated else own)
     return found, mean
 
 

@@ -144,7 +144,7 @@ def _power_of_two(needed: float) -> int:
 def _flies(scene: Scene, flow: Flow) -> bool:
     """Whether all parts are built-in ones that FreeFlight accepts; decided without their formulas, for speed."""
     linear = scene.friction is None and (scene.spring is None or type(scene.spring) is LinearSpring)
-    linear = linear and not scene.depends_on_state
+    linear = linear and all(len(part.variables) == 1 for part in scene.excitations)
     waves = [part.frequencies for part in scene.excitations]
     sinusoids = None not in waves and sum(len(one or ()) for one in waves) <= _MOST_WAVES
     if scene.noise is None or type(scene.noise) is WhiteNoise:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 from vibrokit.errors import ArgumentError
@@ -34,8 +35,26 @@ class Excitation(Part):
 
     @property
     def depends_on_state(self) -> bool:
-        """Whether the force depends on the displacement and the velocity of the mass."""
-        return self.variables == _TIME_AND_STATE
+        """Whether the force depends on the displacement and the velocity of the mass, or moves the support."""
+        return self.variables == _TIME_AND_STATE or self.moves_support
+
+    @property
+    def moves_support(self) -> bool:
+        """Whether it moves the foot of spring and damper."""
+        return type(self).support is not Excitation.support
+
+    def support(self, t: Any) -> Any:
+        """Displacement (m) of the foot of spring and damper at time `t` (s), as a SymPy expression; 0 if not given.
+
+        Spring and damping of the scene act on x − y and v − y′, with the displacement y of all excitations together. It
+        must be differentiable in time.
+        """
+        return 0
+
+    def formulas(self, argument: Callable[[str], Any]) -> tuple[Any, ...]:
+        """Return the force, and the displacement of the support if it moves."""
+        moved = (self.support(argument("t")),) if self.moves_support else ()
+        return *super().formulas(argument), *moved
 
     @abstractmethod
     def force(self, t: Any, *args: Any, **kwargs: Any) -> Any:

@@ -1,6 +1,7 @@
 """Motion of the support: the inertial force that the mass feels in the coordinate relative to the support.
 
-Spring, damping and stops act between the mass and the support, so nothing else changes. The stops move with it.
+Spring, damping and stops act between the mass and the support, so nothing else changes. The stops move with it. Where
+they are fixed in space, x is absolute, and the support moves the foot of spring and damper.
 """
 
 from __future__ import annotations
@@ -74,4 +75,43 @@ class SupportAcceleration(Excitation):
     @property
     def frequencies(self) -> tuple[float, ...]:
         """The frequency ω (s⁻¹) alone."""
+        return (self.frequency,)
+
+
+class SpringSupportMotion(Excitation):
+    """Support of spring and damper that moves as y = a cos(ω t + φ), while the stops are fixed in space.
+
+    The displacement x is absolute: spring and damping act on x − y and v − y′. With a linear spring the force is
+    ω_n² y + 2ζω_n y′. Friction is not carried along.
+
+    Parameters
+    ----------
+    amplitude : float
+        a, in m.
+    frequency : float
+        ω, in rad s⁻¹, positive.
+    phase : float
+        φ, in rad.
+    """
+
+    amplitude: float = parameter("a", "m")
+    frequency: float = parameter("omega", "rad s^-1", above=0)
+    phase: float = parameter("phi", "rad", default=0.0)
+
+    def force(self, t: Any) -> Any:
+        """No force but that of spring and damper."""
+        return 0
+
+    def support(self, t: Any) -> Any:
+        """Displacement at time t: a cos(ω t + φ)."""
+        return self.amplitude * cos(self.frequency * t + self.phase)
+
+    @property
+    def period(self) -> float:
+        """Period 2π/ω (s)."""
+        return 2 * math.pi / self.frequency
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """The frequency ω (s⁻¹) alone, if the spring is linear."""
         return (self.frequency,)

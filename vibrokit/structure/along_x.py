@@ -7,11 +7,13 @@ line. Borders of the forces, such as poles, end regions and searches.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrokit.kernels.vector_field import VectorField
 from vibrokit.oscillator import Oscillator
 from vibrokit.results.region import Region
 from vibrokit.symbolic.repetition import period_along_x
@@ -31,7 +33,22 @@ def turn_of(osc: Oscillator) -> float:
     Between stops, and between poles, motion does not turn over.
     """
     turn = period_along_x(osc.spring) if osc.spring is not None and not osc.barriers else 0.0
-    return 0.0 if turn and osc.model.domain else turn
+    return 0.0 if turn and (osc.model.domain or not _forces_repeat(osc, turn)) else turn
+
+
+@functools.lru_cache(maxsize=256)
+def _forces_repeat(osc: Oscillator, turn: float) -> bool:
+    """Whether forces of time and state are the same a turn further."""
+    if not osc.depends_on_state:
+        return True
+    field = VectorField(osc)
+
+    def forces(moved: float) -> Array:
+        places = [(0.3 * k * osc.time_unit, (0.7 * k + moved, 0.4 - k)) for k in range(1, 6)]
+        return np.array([[field.excitation(i, *place) for i in range(len(osc.excitations))] for place in places])
+
+    here, there = forces(0.0), forces(turn)
+    return bool(np.abs(there - here).max() <= 1e-9 * np.abs(here).max())
 
 
 def turns_to(osc: Oscillator, states: Array, middle: float = 0.0) -> Array:

@@ -11,7 +11,7 @@ from vibrokit.parts.scene import Scene
 from vibrokit.parts.spring import Spring
 from vibrokit.symbolic.borders import Border, borders_of
 from vibrokit.symbolic.contact import DEPTH, RATE, DerivedContact, derive_contact, refuse_steep_touch
-from vibrokit.symbolic.excitations import excitation_force
+from vibrokit.symbolic.excitations import excitation_force, refuse_moving_borders, support_displacement
 from vibrokit.symbolic.forcing import Forcing, forcing_of
 from vibrokit.symbolic.formulas import derived_formula, derived_rates
 from vibrokit.symbolic.jumps import refuse_jumps
@@ -132,11 +132,24 @@ class Equations:
     @cached_property
     def excitations(self) -> tuple[sympy.Expr, ...]:
         """Force of each excitation as an expression in the time, and in x and v where it depends on them."""
-        natural, plane = self.scene.reference_frequency, self.state[:2]
-        return tuple(
-            excitation_force(part, self._symbols_of(f"excitations.{index}"), self.time, plane, natural)
-            for index, part in enumerate(self.scene.excitations)
-        )
+        reference, plane = self.scene.reference_frequency, self.state[:2]
+        found, moved = list[sympy.Expr](), sympy.Integer(0)
+        for index, part in enumerate(self.scene.excitations):
+            symbols = self._symbols_of(f"excitations.{index}")
+            force = excitation_force(part, symbols, self.time, plane, reference)
+            if part.moves_support:
+                before, moved = moved, moved + support_displacement(part, symbols, self.time)
+                force += self._held_at(before) - self._held_at(moved)
+            found.append(force)
+        return tuple(found)
+
+    def _held_at(self, place: sympy.Expr) -> sympy.Expr:
+        """The force of spring and damper, whose foot is at a place that depends on time."""
+        x, v = self.state[:2]
+        held = self._own_damping + self._own_spring + self._forces_of_state.get("spring", 0)
+        if place != 0:
+            refuse_moving_borders(held, (x, v))
+        return held.subs({x: x - place, v: v - sympy.diff(place, self.time)}, simultaneous=True)
 
     @cached_property
     def in_time(self) -> Forcing:

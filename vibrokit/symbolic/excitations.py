@@ -33,10 +33,36 @@ def excitation_force(
     """
     arguments = dict(zip(("t", "x", "v"), (time, *state), strict=True))
     force = derived_formula(part, "force", symbols, tuple(arguments[name] for name in part.variables))
-    if part.depends_on_state:
+    if len(part.variables) > 1:
         _check_smooth(part, force, symbols, state, reference_frequency)
     check_period(part, force, {symbol: part.parameters[name] for name, symbol in symbols.items()}, time, state)
     return force
+
+
+def support_displacement(part: Excitation, symbols: Mapping[str, sympy.Symbol], time: sympy.Symbol) -> sympy.Expr:
+    """Return the displacement of the support as an expression in the time.
+
+    DerivationError is raised if its period is wrong, or if it has no derivative in time.
+    """
+    place = derived_formula(part, "support", symbols, (time,))
+    check_period(part, place, {symbol: part.parameters[name] for name, symbol in symbols.items()}, time, ())
+    if sympy.diff(place, time).has(sympy.Derivative, sympy.Subs, sympy.DiracDelta):
+        plain = place.xreplace({symbol: sympy.Symbol(name) for name, symbol in symbols.items()})
+        raise DerivationError(
+            f"{type(part).__name__}: the displacement {as_text(plain)} of the support has no derivative in time, which "
+            "the damper needs; write a displacement that does not jump."
+        )
+    return place
+
+
+def refuse_moving_borders(held: sympy.Expr, state: tuple[sympy.Symbol, ...]) -> None:
+    """Refuse to move the support of a spring whose force has poles or ends: these would move with it."""
+    for border in borders_of(held, state):
+        raise DerivationError(
+            f"the force of the spring may have no value where {as_text(border.gauge)} = 0, a place that would move "
+            "with the support, and no stepper watches a border that moves; give a spring that has a force everywhere, "
+            "or let the stops move with the support (SupportMotion)."
+        )
 
 
 def _check_smooth(
@@ -81,7 +107,7 @@ def check_period(
     if period is None or not math.isfinite(period):
         return
     for place in _STATES if part.depends_on_state else _STATES[:1]:
-        at = _over_periods(force.subs(numbers).subs(dict(zip(state, place, strict=True))), time, period)
+        at = _over_periods(force.subs(numbers).subs(dict(zip(state, place, strict=False))), time, period)
         change = max(abs(at(share + 1) - at(share)) for share in _SHARES)
         if change > _SAME * max(abs(at(share)) for share in _SHARES):
             raise DerivationError(

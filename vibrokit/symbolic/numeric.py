@@ -45,14 +45,17 @@ def excitation_of(model: Equations, index: int, x: float = 0.0) -> Function:
 
 
 def _mean_of_modulated(model: Equations) -> sympy.Expr:
-    """The mean of the forces that depend on the state and vary periodically; 0 without any."""
+    """The mean of the forces that depend on the state and vary periodically, besides the steady part; 0 without any."""
     found = sympy.Integer(0)
+    if not model.in_time.modulated:
+        return found
     for part, force in zip(model.scene.excitations, model.excitations, strict=True):
-        if part.depends_on_state and part.period is not None and math.isfinite(part.period):
-            varying = sum(term for term in sympy.Add.make_args(force) if model.time in term.free_symbols)
+        if not part.depends_on_state:
+            found += force if model.time not in force.free_symbols else 0
+        elif part.period is not None and math.isfinite(part.period):
             times = (part.period * k / _SAMPLES for k in range(_SAMPLES))
-            found += sum(sympy.sympify(varying).subs(model.numbers).subs(model.time, t) for t in times) / _SAMPLES
-    return found
+            found += sum(force.subs(model.numbers).subs(model.time, t) for t in times) / _SAMPLES
+    return found - model.in_time.steady
 
 
 def contact_force_of(model: Equations, index: int) -> Function:

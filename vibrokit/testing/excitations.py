@@ -40,6 +40,8 @@ class ExcitationChecks(PartChecks[Excitation]):
     def __init__(self, part: Excitation | type[Excitation], rng: Rng = 0) -> None:
         super().__init__(part, rng)
         self.arguments = tuple(sympy.Symbol(name, real=True) for name in self.cls.variables)
+        self.moves_support = self.cls.support is not Excitation.support
+        self.method = "support" if self.moves_support else "force"
 
     def points(self) -> list[tuple[float, ...]]:
         """Random times, and states of moderate size."""
@@ -82,7 +84,9 @@ class ExcitationChecks(PartChecks[Excitation]):
     def _forcing(self, part: Excitation) -> Forcing:
         """The force along time, in one state if it depends on the state."""
         place: dict[sympy.Symbol, float] = dict(zip(self.arguments[1:], _PLACE, strict=False))
-        return Forcing(self.expression(part).subs(place), self.arguments[0], self.values(part))
+        model = self.scene(part).model
+        force = sympy.expand(model.excitations[0]) if self.moves_support else self.expression(part)
+        return Forcing(force.subs(place), self.arguments[0], model.numbers if self.moves_support else self.values(part))
 
     def _change(self, part: Excitation, shift: float) -> float:
         """The largest change of the force after a shift in time, over its size, at times that seldom are of jumps."""
@@ -141,13 +145,16 @@ class ExcitationChecks(PartChecks[Excitation]):
         scene = Oscillator(
             natural_frequency=1.0,
             damping_ratio=0.0,
-            spring=CubicSpring(linear=0.0, cubic=0.0),
+            spring=None if self.moves_support else CubicSpring(linear=0.0, cubic=0.0),
             noise=WhiteNoise(intensity=1.0),
             excitations=(part,),
         )
-        code, formula = Compiled(scene, Flow.HAMILTONIAN_VARIATIONAL), self.expression(part)
+        code, formula = (
+            Compiled(scene, Flow.HAMILTONIAN_VARIATIONAL),
+            self.expression(part),
+        )  # y is the force for ω_n = 1
         for orders, (index, momentum, factor) in ENTRIES.items():
-            if sum(orders) and not part.depends_on_state:
+            if sum(orders) and len(self.arguments) == 1:
                 continue
             reference = self.reference(part, derivative(formula, self.arguments, (0, *orders)[: len(self.arguments)]))
             for time, *state in self.points():

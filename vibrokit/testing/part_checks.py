@@ -39,7 +39,7 @@ class PartChecks(ABC, Generic[P]):
 
     kind: ClassVar[type[Part]]
     group: ClassVar[Group]
-    method: ClassVar[str] = "force"
+    method: str = "force"
     arguments: tuple[sympy.Symbol, ...]
     place: ClassVar[str]
     """Path of the part in its scene."""
