@@ -268,3 +268,19 @@ def test_a_restitution_is_not_computed_from_a_force_without_a_mass():
     with pytest.raises(ParameterError, match="stiffness is 2 kN/m and is computed with before a scene gives the mass"):
         vk.KelvinVoigt.from_restitution(0.5, "2 kN/m")
     assert vk.KelvinVoigt.from_restitution(0.5, "4 1/s^2") == vk.KelvinVoigt.from_restitution(0.5, 4.0)
+
+
+def test_an_exponent_of_the_law_is_one_of_its_unit():
+    class Power(vk.ContactLaw):
+        stiffness: float = vk.parameter("k", "m^(1-n) s^-2")
+        exponent: float = vk.parameter("n", "", structural=True)
+
+        def force(self, depth, rate):
+            return self.stiffness * depth**self.exponent
+
+    for exponent, unit, declared in ((1.5, "GN/m^1.5", "m^(-1/2) s^-2"), (4 / 3, "GN/m^(4/3)", "m^(-1/3) s^-2")):
+        law = Power(f"3 {unit}", exponent)
+        assert law.of_mass(2.0).stiffness == 1.5e9
+        assert law.declared()[0].unit == declared
+    with pytest.raises(ParameterError, match=r"^Power: stiffness must be in m\^\(-1\) s\^-2, or kg m\^-1 s\^-2 with"):
+        Power("3 GN/m^1.5", 2.0)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, shown
+from vibrokit.parts.formula import evaluate
 from vibrokit.quantity import Quantity, is_quantity, read
 
 _KEY = "vibrokit.parameter"
+_NAMED = re.compile(r"\^\(([^()]*[^\W\d_][^()]*)\)")  # an exponent in which a parameter stands
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,6 +84,22 @@ class Parameter:
             given = "one above 1.8e308" if large else shown(value) if math.isnan(number) else f"{number:g}"
             raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {given}.")
         return number
+
+    def with_exponents(self, values: Mapping[str, Any]) -> Parameter:
+        """Return the declaration with numbers in the exponents of its unit: ``"m^(1-n) s^-2"`` for a value of n.
+
+        `values` are those of the parameters of the part, by symbol.
+        """
+        if self.unit is None or not _NAMED.search(self.unit):
+            return self
+
+        def exponent(match: re.Match[str]) -> str:
+            return f"^({Fraction(evaluate(match[1], values)).limit_denominator(1000)})"
+
+        try:
+            return dataclasses.replace(self, unit=_NAMED.sub(exponent, self.unit))
+        except (LookupError, TypeError, ValueError, ArithmeticError, SyntaxError):  # no formula, or no number
+            return self
 
     def known(self, owner: str, value: Any) -> float:
         """Return `value` as `checked` does, for a computation; ParameterError if it waits for the mass of a scene."""

@@ -76,9 +76,10 @@ class Part(ABC, metaclass=Constructed):
         return not inspect.isabstract(cls) and ABC not in cls.__bases__
 
     def __post_init__(self) -> None:
+        values = self._by_symbol
         for declared in self._declared:
             value = getattr(self, declared.attribute)
-            number = declared.checked(type(self).__name__, value)
+            number = declared.with_exponents(values).checked(type(self).__name__, value)
             exact = declared.structural and isinstance(value, Real) and not isinstance(value, float)
             if not exact:  # a structural Fraction stays what it is
                 object.__setattr__(self, declared.attribute, number)
@@ -95,7 +96,15 @@ class Part(ABC, metaclass=Constructed):
             return self._declared
         fixed = tuple((d.name, self._value(d)) for d in self._declared if d.structural)
         shaping = _exponents(type(self), fixed)
-        return tuple(dataclasses.replace(d, structural=d.structural or d.name in shaping) for d in self._declared)
+        values = self._by_symbol
+        return tuple(
+            dataclasses.replace(d.with_exponents(values), structural=d.structural or d.name in shaping)
+            for d in self._declared
+        )
+
+    @property
+    def _by_symbol(self) -> dict[str, Any]:
+        return {declared.symbol: getattr(self, declared.attribute) for declared in self._declared}
 
     def formulas(self, argument: Callable[[str], Any]) -> tuple[Any, ...]:
         """Return all formulas of this part, for arguments that `argument` makes from their names."""

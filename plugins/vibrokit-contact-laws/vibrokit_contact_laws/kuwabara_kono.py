@@ -36,7 +36,7 @@ class KuwabaraKono(ContactLaw):
     """
 
     stiffness: float = parameter("k", "m^(-1/2) s^-2", minimum=0)
-    dissipation: float = parameter("c", "m^(-1/2) s^-1", minimum=0)
+    dissipation: float = parameter("c", "m^(-1/2) s^-1", minimum=0, mass_power=1)
 
     def force(self, depth: Any, rate: Any) -> Any:
         """Force on the mass: k δ^(3/2) + c √δ δ′."""
