@@ -100,6 +100,22 @@ def test_tables_are_in_the_unit_of_the_user():
     assert along_table(one).header[1] == "barriers.0.position = −barriers.1.position/2 (Hz)"
 
 
+@pytest.mark.parametrize(
+    ("text", "base", "unit", "size"),
+    [("65 Hz", "rad s^-1", "Hz", 2 * math.pi), ("0.3 mm", "m", "mm", 1e-3), ("6 N", "m s^-2", "N", 1 / 0.35)],
+)
+def test_without_a_unit_of_its_own_it_is_shown_in_that_of_the_scene(text, base, unit, size):
+    one = with_paths()
+    given = {**one.scene, "mass": 0.35, "given": {one.parameter: text}}
+    found = dataclasses.replace(one, unit=base, scene=given)
+    label, scale = found.axis()
+    assert label.endswith(f"({unit})")
+    assert scale == pytest.approx(size, rel=1e-15)
+    np.testing.assert_allclose(found.plot().curves[0].get_xdata(), one.values / size)
+    assert dataclasses.replace(found, settings={**one.settings, "unit": "km"}).shown_in == "km"
+    assert one.shown_in is None
+
+
 def amplitude(frequency, zeta=0.1, force=0.1):
     """Of the linear response of tests.scenes.scene."""
     return force / np.hypot(1 - frequency**2, 2 * zeta * frequency)

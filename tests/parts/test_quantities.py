@@ -1,6 +1,7 @@
 """Parts and scenes whose numbers have units: what a drawing says, divided by the mass in one place."""
 
 import copy
+import dataclasses
 import json
 import math
 import pickle
@@ -12,10 +13,14 @@ import pytest
 
 import vibrokit as vk
 from tests.assessment.test_plausibility import TUBE
+from tests.builders import full_structure
 from vibrokit.assessment.plausibility import plausibility
-from vibrokit.errors import ParameterError, SceneError
+from vibrokit.errors import ParameterError, SceneError, StructureError
 from vibrokit.parts.parameter import Parameter
 from vibrokit.quantity import Quantity
+from vibrokit.report.pictures import scene_picture
+from vibrokit.report.tables import input_table
+from vibrokit.results.one_scene import check_scene
 from vibrokit.scene_file import scene_data, scene_from_data, scene_text
 
 DRAWING = """mass = "0.35 kg"
@@ -284,3 +289,31 @@ def test_an_exponent_of_the_law_is_one_of_its_unit():
         assert law.declared()[0].unit == declared
     with pytest.raises(ParameterError, match=r"^Power: stiffness must be in m\^\(-1\) s\^-2, or kg m\^-1 s\^-2 with"):
         Power("3 GN/m^1.5", 2.0)
+
+
+def test_reports_show_what_was_given(tube):
+    rows = {row[0]: row[1:] for row in input_table(tube).rows}
+    assert rows["excitations.0.amplitude"] == ("f", "17.14285714", "m s⁻²", "6 N")
+    assert rows["stiffness"][-1] == "22 kN/m"
+    assert rows["mass"] == ("", "0.35", "kg", "0.35 kg")
+    drawing = scene_picture(tube).svg
+    for text in ("22 kN/m", "2 MN/m", "0.25 mm", "6 N", "65 Hz", "1e-3 N^2/Hz"):
+        assert text in drawing
+
+
+def test_a_saved_record_keeps_what_was_given(tube, tmp_path):
+    record = dataclasses.replace(full_structure(), scene=scene_data(tube))
+    record.save(tmp_path / "tube.nc")
+    found = vk.load_result(tmp_path / "tube.nc").oscillator
+    assert found == tube
+    assert found.replace(mass=0.7).parameters == tube.replace(mass=0.7).parameters
+    assert found.replace(mass=0.7).stiffness == 22e3 / 0.7
+
+
+def test_records_of_one_motion_are_of_one_scene_whatever_units_it_was_given_in(tube):
+    by_hand = scene_data(TUBE.replace(natural_frequency=None, stiffness=22e3 / 0.35))
+    check_scene("a record", dataclasses.replace(full_structure(), scene=scene_data(tube)), by_hand)
+    with pytest.raises(StructureError, match="is of another scene: "):
+        check_scene(
+            "a record", dataclasses.replace(full_structure(), scene=scene_data(tube.replace(mass=0.7))), by_hand
+        )
