@@ -12,7 +12,7 @@ CUBIC = vk.CubicSpring(linear=1.0, cubic=2.0)
 @pytest.mark.parametrize(
     ("numbers", "shown", "absent"),
     [
-        ({"natural_frequency": 2.0, "damping_ratio": 0.1}, ("ω_n = 2 s⁻¹", "ζ = 0.1"), ("κ", "c =")),
+        ({"natural_frequency": 2.0, "damping_ratio": 0.1}, ("ω_n = 2 rad s⁻¹", "ζ = 0.1"), ("κ", "c =")),
         ({"stiffness": 4.0, "damping": 0.4}, ("κ = 4 s⁻²", "c = 0.4 s⁻¹"), ("ω_n", "ζ")),
         ({"natural_frequency": 0, "damping": 0.4}, ("c = 0.4 s⁻¹",), ("ω_n", "ζ", "κ")),
         ({"stiffness": 0, "damping_ratio": 0}, ("ζ = 0",), ("ω_n", "κ", "c =")),

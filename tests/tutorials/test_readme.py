@@ -169,7 +169,8 @@ def test_toml_snippets_are_read(page, tmp_path):
             path = tmp_path / f"{number}.toml"
             path.write_text(snippet, encoding="utf-8")
             osc = vk.load_scene(path)
-            assert osc.section_map([[0.0, 0.0]]).shape == (1, 2)
+            rest = [[0.0] * len(osc.model.state)]
+            assert osc.section_map(rest).shape == (1, len(osc.model.state))
             if page.stem == "command-line":  # a steady state runs clear of the stop, and one hammers it
                 found = vk.find_structure(osc, cells=(20, 20), rng=0)
                 assert [state.impacts for state in found.attractors] == [0, 2]
