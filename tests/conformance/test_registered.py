@@ -29,11 +29,12 @@ KINDS = [
     (Group.NOISE_MODELS, NoiseModel, testing.noise_model_checks),
 ]
 REGISTERED = [
-    pytest.param(make, id=f"{group.noun}-{name}-{check}")
+    pytest.param(make, id=f"{group.noun}-{name}-{check}", marks=() if part.is_ours() else pytest.mark.long)
     for group, kind, checks in KINDS
     for name, part in load_all(group, kind).items()
     for check, make in checks(part, rng=1)
 ]
+"""Parts of plug-ins take longer than a group may; each plug-in's own tests check one."""
 
 
 @pytest.mark.parametrize("make", REGISTERED)
