@@ -47,6 +47,7 @@ from .parts.dissipative import KelvinVoigt as KelvinVoigt
 from .parts.excitation import Constant as Constant
 from .parts.excitation import Excitation as Excitation
 from .parts.excitation import Harmonic as Harmonic
+from .parts.excitation import Tone as Tone
 from .parts.filtered_noise import FilteredNoise as FilteredNoise
 from .parts.friction import DryFriction as DryFriction
 from .parts.friction import Friction as Friction

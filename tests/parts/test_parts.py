@@ -61,7 +61,7 @@ class TestAbstractOrFinal:
         with pytest.raises(TypeError) as refused:
             type("Mine", (finished,), {})
         said = str(refused.value)
-        kinds = (vk.ContactLaw, vk.Spring, vk.Excitation, vk.StationaryNoise, vk.NoiseModel)
+        kinds = (vk.ContactLaw, vk.Spring, vk.Tone, vk.Excitation, vk.StationaryNoise, vk.NoiseModel)
         kind = next(base for base in kinds if isinstance(part, base))
         assert said.startswith(f"Mine inherits from {finished.__name__}, ")
         assert f"inherit from {kind.__name__} " in said

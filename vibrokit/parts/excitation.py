@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from vibrokit.errors import ArgumentError
 from vibrokit.parts.functions import cos
@@ -79,7 +79,24 @@ class Excitation(Part):
         return None
 
 
-class Harmonic(Excitation):
+class Tone(Excitation, ABC):
+    """Excitation of one frequency ω, which a subclass declares as `frequency`. Abstract."""
+
+    if TYPE_CHECKING:
+        frequency: float
+
+    @property
+    def period(self) -> float:
+        """Period 2π/ω (s)."""
+        return 2 * math.pi / self.frequency
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """The frequency ω (s⁻¹) alone."""
+        return (self.frequency,)
+
+
+class Harmonic(Tone):
     """Harmonic force: f cos(ω t + φ).
 
     Parameters
@@ -99,16 +116,6 @@ class Harmonic(Excitation):
     def force(self, t: Any) -> Any:
         """Force at time t: f cos(ω t + φ)."""
         return self.amplitude * cos(self.frequency * t + self.phase)
-
-    @property
-    def period(self) -> float:
-        """Period 2π/ω (s)."""
-        return 2 * math.pi / self.frequency
-
-    @property
-    def frequencies(self) -> tuple[float, ...]:
-        """The frequency ω (s⁻¹) alone."""
-        return (self.frequency,)
 
 
 class Constant(Excitation):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.excitation import Tone
 from vibrokit.parts.functions import cos
 from vibrokit.parts.parameter import parameter
 
 
-class ParametricStiffness(Excitation):
+class ParametricStiffness(Tone):
     """Stiffness that varies harmonically, as that of a gear mesh or of a parametron: force −κ cos(ωt + φ) x.
 
     It is added to the spring of the scene. With ω_n = 1, κ = −λ and ω = 2, a scene is
@@ -34,13 +33,3 @@ class ParametricStiffness(Excitation):
     def force(self, t: Any, x: Any, v: Any) -> Any:
         """Force at time t: −κ cos(ωt + φ) x."""
         return -self.stiffness * cos(self.frequency * t + self.phase) * x
-
-    @property
-    def period(self) -> float:
-        """Period 2π/ω (s)."""
-        return 2 * math.pi / self.frequency
-
-    @property
-    def frequencies(self) -> tuple[float, ...]:
-        """The frequency ω (s⁻¹) alone."""
-        return (self.frequency,)

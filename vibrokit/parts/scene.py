@@ -8,7 +8,6 @@ import math
 from collections.abc import Mapping
 from typing import Any, Self
 
-from vibrokit.arguments import members, real
 from vibrokit.construction import called
 from vibrokit.errors import NoSectionError, ParameterError, SceneError, nearest, shown
 from vibrokit.parts.barrier import Barrier
@@ -18,6 +17,7 @@ from vibrokit.parts.friction import Friction
 from vibrokit.parts.noise import NoiseModel
 from vibrokit.parts.own_numbers import NUMBERS, OwnNumbers, displaced, refuse_two_meanings
 from vibrokit.parts.parameter import Entry, Parameter
+from vibrokit.parts.scene_checks import check_names, check_periods, check_stops, checked_parts
 from vibrokit.parts.single_parts import FORCES_OF_STATE, SINGLE_PARTS
 from vibrokit.parts.spring import Spring
 from vibrokit.parts.time_scale import reference_frequency
@@ -68,15 +68,15 @@ class Scene(OwnNumbers):
 
     def __post_init__(self) -> None:
         self._check_numbers(self.spring)
-        object.__setattr__(self, "barriers", _checked_parts("barriers", self.barriers, Barrier))
-        object.__setattr__(self, "excitations", _checked_parts("excitations", self.excitations, Excitation))
+        object.__setattr__(self, "barriers", checked_parts("barriers", self.barriers, Barrier))
+        object.__setattr__(self, "excitations", checked_parts("excitations", self.excitations, Excitation))
         for name, part in self.single_parts.items():
-            _checked_parts(name, (part,), SINGLE_PARTS[name])
+            checked_parts(name, (part,), SINGLE_PARTS[name])
         if self.noise is not None:
-            _check_names(self.noise)
+            check_names(self.noise)
         self._divide_by_mass()
-        self._check_stops()
-        self._check_periods()
+        check_stops(self.barriers)
+        check_periods(self.excitations)
 
     def _divide_by_mass(self) -> None:
         """Divide what was given as a force by the mass; this is done nowhere else."""
@@ -105,30 +105,6 @@ class Scene(OwnNumbers):
         for path, part in self.placed_parts():
             found |= {f"{path}.{name}": value for name, value in part.quantities.items()}
         return found
-
-    def _check_stops(self) -> None:
-        for side in ("left", "right"):
-            places = [barrier.position for barrier in self.barriers if barrier.side == side]
-            if len(places) > 1:
-                raise SceneError(
-                    f"scene: at most one stop per side is allowed, got {len(places)} on the {side} side, at "
-                    f"{', '.join(f'{p:g}' for p in places)}."
-                )
-        stops = {barrier.side: barrier.position for barrier in self.barriers}
-        if len(stops) == 2 and stops["left"] > stops["right"]:
-            raise SceneError(
-                f"scene: the left stop, at {stops['left']:g}, is to the right of the right stop, at "
-                f"{stops['right']:g}; exchange them, or give both the same position."
-            )
-
-    def _check_periods(self) -> None:
-        for index, part in enumerate(self.excitations):
-            period = part.period
-            if period is not None and not real(period) > 0:
-                raise SceneError(
-                    f"scene: the period of excitations.{index} ({type(part).__name__}) must be a positive number, None "
-                    f"for a constant force, or math.inf for one that never repeats, got {shown(period)}."
-                )
 
     @property
     def single_parts(self) -> dict[str, Any]:
@@ -285,28 +261,6 @@ class Scene(OwnNumbers):
             if round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-12 * ratio and intervals <= _MOST_INTERVALS:
                 return intervals
         return 0
-
-
-def _checked_parts(name: str, parts: Any, kind: type) -> tuple[Any, ...]:
-    if isinstance(parts, kind):
-        raise SceneError(f"scene: {name} must be a sequence, got a single {type(parts).__name__}; give a list of it.")
-    found = members(parts)
-    if found is None:
-        raise SceneError(f"scene: {name} must be a sequence of {kind.__name__} objects, got {shown(parts)}.")
-    for part in found:
-        if not isinstance(part, kind):
-            raise SceneError(f"scene: {name} must be of type {kind.__name__}, got {shown(part)}.")
-    return found
-
-
-def _check_names(noise: NoiseModel) -> None:
-    names: Any = noise.extra_states
-    fits = isinstance(names, tuple) and all(isinstance(name, str) and name for name in names)
-    if not fits or len(set(names)) < len(names):
-        raise SceneError(
-            f"scene: {type(noise).__name__}.extra_states must be a tuple of distinct names, such as ('y',), got "
-            f"{shown(names)}."
-        )
 
 
 def _replaced(owner: Any, path: list[str], value: Any) -> Any:

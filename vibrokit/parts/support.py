@@ -6,15 +6,14 @@ they are fixed in space, x is absolute, and the support moves the foot of spring
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from vibrokit.parts.excitation import Excitation
+from vibrokit.parts.excitation import Tone
 from vibrokit.parts.functions import cos
 from vibrokit.parts.parameter import parameter
 
 
-class SupportMotion(Excitation):
+class SupportMotion(Tone):
     """Support that moves as y = a cos(ω t + φ), stops with it: the force is −y″ = a ω² cos(ω t + φ).
 
     Parameters
@@ -35,18 +34,8 @@ class SupportMotion(Excitation):
         """Force at time t: a ω² cos(ω t + φ)."""
         return self.amplitude * self.frequency**2 * cos(self.frequency * t + self.phase)
 
-    @property
-    def period(self) -> float:
-        """Period 2π/ω (s)."""
-        return 2 * math.pi / self.frequency
 
-    @property
-    def frequencies(self) -> tuple[float, ...]:
-        """The frequency ω (s⁻¹) alone."""
-        return (self.frequency,)
-
-
-class SupportAcceleration(Excitation):
+class SupportAcceleration(Tone):
     """Support with the acceleration y″ = A cos(ω t + φ), stops with it: the force is −A cos(ω t + φ).
 
     Parameters
@@ -67,18 +56,8 @@ class SupportAcceleration(Excitation):
         """Force at time t: −A cos(ω t + φ)."""
         return -self.amplitude * cos(self.frequency * t + self.phase)
 
-    @property
-    def period(self) -> float:
-        """Period 2π/ω (s)."""
-        return 2 * math.pi / self.frequency
 
-    @property
-    def frequencies(self) -> tuple[float, ...]:
-        """The frequency ω (s⁻¹) alone."""
-        return (self.frequency,)
-
-
-class SpringSupportMotion(Excitation):
+class SpringSupportMotion(Tone):
     """Support of spring and damper that moves as y = a cos(ω t + φ), while the stops are fixed in space.
 
     The displacement x is absolute: spring and damping act on x − y and v − y′. With a linear spring the force is
@@ -105,13 +84,3 @@ class SpringSupportMotion(Excitation):
     def support(self, t: Any) -> Any:
         """Displacement at time t: a cos(ω t + φ)."""
         return self.amplitude * cos(self.frequency * t + self.phase)
-
-    @property
-    def period(self) -> float:
-        """Period 2π/ω (s)."""
-        return 2 * math.pi / self.frequency
-
-    @property
-    def frequencies(self) -> tuple[float, ...]:
-        """The frequency ω (s⁻¹) alone, if the spring is linear."""
-        return (self.frequency,)
