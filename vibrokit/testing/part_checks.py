@@ -19,6 +19,7 @@ import numpy as np
 import sympy
 
 from vibrokit.oscillator import Oscillator
+from vibrokit.parts.formula_part import FormulaPart
 from vibrokit.parts.part import Part
 from vibrokit.registry import Group, name_of
 from vibrokit.scene_file import load_scene, save_scene
@@ -124,10 +125,12 @@ class PartChecks(ABC, Generic[P]):
         return f"{len(self.samples)} sets of parameters"
 
     def declared(self) -> str:
-        """Every parameter has a unit, and a symbol that is valid in code."""
-        for declared in self.samples[0].declared():
+        """Every parameter has a unit, unless it is a constant of a formula as text, and a symbol valid in code."""
+        part = self.samples[0]
+        constants: dict[str, Any] = dict(part.constants) if isinstance(part, FormulaPart) else {}
+        for declared in part.declared():
             name = f"{self.cls.__name__}.{declared.name}"
-            if declared.unit is None:
+            if declared.unit is None and declared.name not in constants:
                 raise ConformanceError(
                     f'{name} has no unit; declare it with parameter(symbol, unit), with unit "" if dimensionless.'
                 )
@@ -136,7 +139,8 @@ class PartChecks(ABC, Generic[P]):
                 raise ConformanceError(
                     f'{name}: symbol must be a name that SymPy can print, such as "k" or "omega", got {symbol!r}.'
                 )
-        return ", ".join(f"{d.symbol} [{d.unit or '1'}]" for d in self.samples[0].declared() if not d.structural)
+        shown = (f"{d.symbol} [{d.unit or '1'}]" for d in part.declared() if not d.structural and d.unit is not None)
+        return ", ".join(shown)
 
     def ranges(self) -> str:
         """Values in the declared range are kept, and values outside it are refused."""
