@@ -38,7 +38,6 @@ UNITS = pint.UnitRegistry()
         ("3 rad/s", "rad s^-1", 3.0, 0),
         ("3 1/s", "rad s^-1", 3.0, 0),
         ("3 s⁻¹", "s^-1", 3.0, 0),
-        ("3 rad/s", "s^-1", 3.0, 0),
         ("90 deg", "rad", math.pi / 2, 0),
         ("90°", "rad", math.pi / 2, 0),
         ("4 (m/s²)²/Hz", "m^2 s^-3", 2.0, 0),  # D is half the one-sided spectral density
@@ -86,6 +85,9 @@ def test_damping_takes_the_mass_where_it_is_declared():
         ("0.1 kg", "", "must be without a dimension, got '0.1 kg', which is in kg"),
         ("5 hz", "rad s^-1", r"has the unknown unit 'hz'; allowed are units of rad s\^-1, such as Hz or rad/s\.$"),
         ("5 Hz", "s^-1", "is '5 Hz', and hertz and radians have no meaning in a parameter in s.-1 that is no angular"),
+        ("3 rad/s", "s^-1", "hertz and radians have no meaning"),
+        ("12 turn/s", "s^-1", "hertz and radians have no meaning"),  # nor in a damping
+        ("5 deg", "", "hertz and radians have no meaning"),
         ("1 m^2/s^4/(rad/s)", "m^2 s^-3", "hertz and radians have no meaning"),
         ("1 m^2/s^3", "m^2 s^-4 Hz^-1", "hertz and radians have no meaning"),
         ("3 degC", "", "has the unknown unit 'degC'"),  # its zero is another
@@ -94,6 +96,7 @@ def test_damping_takes_the_mass_where_it_is_declared():
         ("1 mm", "m^(1-n) s^-2", r"has the unit m\^\(1-n\) s\^-2, which no other is compared with"),
         ("1 s^9^9^9", "s", "unknown unit"),  # Pint would compute these powers
         ("1 s^(9)^(9)^9", "s", "unknown unit"),
+        ("6 ((((min^99)^99)^99)^99)", "m s^-2", "unknown unit"),
         ("1 (9)^9 s", "s", "unknown unit"),
         ("1 9**9**9", "s", "unknown unit"),
         ("1 s" + " s" * 60, "s", "must be a number, or a number with a unit"),
@@ -125,6 +128,18 @@ def test_texts_that_are_no_quantities():
 def test_quantities_of_pint_of_any_registry(quantity, unit, text, value):
     found = read("x", quantity, unit)
     assert (found.text, float(found)) == (text, pytest.approx(value, rel=1e-15))
+
+
+def test_a_unit_that_pint_has_under_two_names_is_written_in_full():
+    found = read("x", UNITS.Quantity(3.0, "milliinch"), "m")
+    assert (found.text, float(found)) == ("3 milliinch", pytest.approx(7.62e-5, rel=1e-15))
+
+
+def test_a_unit_of_one_registry_alone():
+    own = pint.UnitRegistry()
+    own.define("kip = 2 newton")
+    with pytest.raises(ParameterError, match="must be one real number with its unit"):
+        read("x", own.Quantity(1.0, "kip"), "m s^-2")
 
 
 @pytest.mark.parametrize("magnitude", [np.array([1.0, 2.0]), 1j])
@@ -173,7 +188,9 @@ def test_numbers_of_a_command_line():
     assert number_in("x", "0.57", "rad s^-1") == (0.57, None)
     assert number_in("x", " 0.25mm", "m") == (2.5e-4, "mm")
     assert number_in("x", "7 N", "m s^-2", 3.5) == (2.0, "N")
-    assert number_in("x", "7 N s/m", "s^-1", 3.5) == (2.0, "N s/m")
+    assert number_in("x", "7 N s/m", "s^-1", 3.5, mass_power=1) == (2.0, "N s/m")
+    with pytest.raises(ParameterError, match="must be in rad"):
+        number_in("x", "7 N s/m", "rad s^-1", 3.5)
     assert size_of("Hz", "rad s^-1") == 2 * math.pi
     for text, words in (("", "must be a number"), ("mm", "must be a number"), ("1 N", "needs a mass")):
         with pytest.raises(ParameterError, match=f"^x .*{words}"):

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibrokit.construction import called
 from vibrokit.errors import IntegrationError, ParameterError, SceneError, TooManyStepsError, shown
+from vibrokit.measured.real_array import real_array
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.scene import Scene
 from vibrokit.results.trajectory import Trajectory
@@ -256,7 +257,7 @@ class Oscillator(Scene):
     def _checked_states(self, states: ArrayLike, dimensions: int) -> Array:
         size = 2 + len(self.noise.extra_states if self.noise else ())
         try:
-            checked = np.atleast_2d(np.asarray(states, dtype=float))
+            checked = np.atleast_2d(real_array(states))
         except (TypeError, ValueError, OverflowError) as error:
             raise ParameterError(
                 f"states must be an array of numbers of shape (count, {size}), or one state: {error}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Mapping
@@ -21,8 +22,8 @@ _EXAMPLES: Mapping[str, str] = {
     "s": "ms or h",
     "kg": "kg or g",
     "rad": "deg",
-    "m s^-2": "m/s^2, g_n or N",
-    "m^2 s^-3": "(m/s^2)^2/Hz, g_n^2/Hz or N^2/Hz",
+    "m s^-2": "m/s^2 or g_n",
+    "m^2 s^-3": "(m/s^2)^2/Hz or g_n^2/Hz",
     "": "%",
 }
 
@@ -54,7 +55,7 @@ class Quantity(float):
 
     def __new__(cls, text: str, given: float, mass_power: int = 0, mass: float | None = None) -> Self:
         """Make a quantity of its attributes; `read` makes one of a text."""
-        quantity = super().__new__(cls, given if mass is None or not mass_power else given / mass**mass_power)
+        quantity = super().__new__(cls, given if mass is None or not mass_power else per_mass(given, mass, mass_power))
         quantity.text, quantity.given, quantity.mass_power, quantity.mass = text, given, mass_power, mass
         return quantity
 
@@ -80,6 +81,14 @@ class Quantity(float):
     def of_mass(self, mass: float | None) -> Quantity:
         """Return the quantity for a mass (kg), whatever it was divided by before."""
         return Quantity(self.text, self.given, self.mass_power, None if mass is None else float(mass))
+
+
+def per_mass(value: float, mass: float, power: int) -> float:
+    """Return a value divided by a power of the mass; infinite or 0 where that is no number of double precision."""
+    try:
+        return value / mass**power
+    except (OverflowError, ZeroDivisionError):  # of the power
+        return value / mass / mass
 
 
 def is_quantity(value: Any) -> bool:
@@ -120,10 +129,12 @@ def read(owner: str, value: Any, unit: str | None, mass_power: int | None = None
     return Quantity(text, number, power, value.mass if isinstance(value, Quantity) else None)
 
 
-def number_in(owner: str, text: str, unit: str | None, mass: float | None = None) -> tuple[float, str | None]:
+def number_in(
+    owner: str, text: str, unit: str | None, mass: float | None = None, mass_power: int | None = None
+) -> tuple[float, str | None]:
     """Return the number that a text such as ``"42 Hz"`` stands for, in SI base units, and its unit if it has one.
 
-    Forces are divided by a mass (kg).
+    Forces are divided by a mass (kg); `mass_power` as of `read`.
 
     Raises
     ------
@@ -134,7 +145,7 @@ def number_in(owner: str, text: str, unit: str | None, mass: float | None = None
         number, name = _split(text)
         if not name:
             return float(number), None
-        value, power = _compared(text.strip(), unit, mass_power=None, shown_only=True)
+        value, power = _compared(text.strip(), unit, mass_power)
     except ParameterError as error:
         raise ParameterError(f"{owner} {error}") from None
     found = Quantity(text, value, power, mass)
@@ -146,11 +157,18 @@ def number_in(owner: str, text: str, unit: str | None, mass: float | None = None
 def size_of(unit: str, base: str | None, mass: float | None = None) -> float:
     """Return the size of a unit in the SI base units of a parameter, such as 2π for Hz and ``"rad s^-1"``.
 
+    Whether the parameter may be divided by the mass is not asked: values that are shown have been read before.
+
     Raises
     ------
     ParameterError
         As of `number_in`.
     """
+    if not isinstance(unit, str):
+        raise ParameterError(f"a unit is given as text, such as 'mm', got {shown(unit)}.")
+    for power in (1, 2):
+        with contextlib.suppress(ParameterError):
+            return number_in("unit", f"1 {unit}", base, mass, power)[0]
     return number_in("unit", f"1 {unit}", base, mass)[0]
 
 
@@ -159,7 +177,7 @@ def unit_in(text: str) -> str:
     return _split(text)[1]
 
 
-def _compared(text: str, unit: str | None, mass_power: int | None, shown_only: bool = False) -> tuple[float, int]:
+def _compared(text: str, unit: str | None, mass_power: int | None) -> tuple[float, int]:
     """The value of a text in SI base units, and the power of the mass by which it exceeds a unit."""
     number, name = _split(text)
     if unit is None:
@@ -167,9 +185,8 @@ def _compared(text: str, unit: str | None, mass_power: int | None, shown_only: b
     wanted, given = _declared(unit), _unit(name, unit)
     power = _mass_power(wanted) if mass_power is None else mass_power
     mass = given.powers.get("kilogram", 0.0) - wanted.powers.get("kilogram", 0.0)
-    allowed = (0, 1, 2) if shown_only else (0, power)
     divided = {name: exponent - mass * (name == "kilogram") for name, exponent in given.powers.items()}
-    if mass not in allowed or not _alike(divided, wanted.powers):
+    if mass not in (0, power) or not _alike(divided, wanted.powers):
         raise ParameterError(_wrong_dimension(text, given, unit, wanted, power))
     value = float(number)
     if value and math.isfinite(value):
@@ -229,7 +246,7 @@ def _alike(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
 def _of_cycles(text: str, given: Unit, unit: str, wanted: Unit) -> float:
     """What a value is multiplied by because hertz and radians are not merely 1/s and 1."""
     angle, angular = given.powers.get("radian", 0.0), wanted.powers.get("radian", 0.0)
-    if given.cycles == wanted.cycles and angle in (0.0, 1.0):
+    if given.cycles == wanted.cycles and angle in (0.0, angular):
         return 1.0
     if given.cycles == 1.0 and angular == 1.0 and not angle:
         return 2 * math.pi
@@ -245,9 +262,10 @@ def _wrong_dimension(text: str, given: Unit, unit: str, wanted: Unit, power: int
     massive = {**wanted.powers, "kilogram": wanted.powers.get("kilogram", 0.0) + power}
     heavier = f", or {in_words(massive)} with the mass of the scene" if power else ""
     gram = "; g is the gram, and g_n the standard gravity" if re.search(r"\bg\b", _split(text)[1]) else ""
+    force = ", or of force, such as N" if power == 1 and unit == "m s^-2" else ""
     return (
         f"must be {f'in {unit}' if unit else 'without a dimension'}{heavier}, got {shown(text)}, which is in "
-        f"{in_words(given.powers)}{gram}; allowed are units of {_allowed(unit)}."
+        f"{in_words(given.powers)}{gram}; allowed are units of {_allowed(unit)}{force}."
     )
 
 

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-# Names, products, quotients and small exponents: Pint would compute a tower of powers for ever.
+# Names, products, quotients and small exponents, and no brackets in brackets: Pint would compute a tower of powers, or
+# powers of powers, for ever.
 _EXPONENT = r"\^\s*(?:[-+]?\d{1,2}(?:\.\d{1,6})?|\(\s*[-+]?\d{1,2}(?:\.\d{1,6}|\s*/\s*\d{1,2})?\s*\))(?!\s*\^)"
 _UNIT = re.compile(rf"(?:1\s*/)?(?:[^\W\d]\w*+|[°%]|[\s*/()]|{_EXPONENT})+")
 _RAISED = re.compile("[⁺⁻⁰¹²³⁴-⁹]+")
@@ -34,8 +35,13 @@ def is_of_pint(value: Any) -> bool:
 def written(quantity: Any) -> str:
     """Return a quantity of Pint as text; raises TypeError or ValueError if it is not one real number."""
     number = repr(float(quantity.magnitude)).removesuffix(".0")
-    unit = f"{quantity.units:~D}".replace(" / ", "/").replace(" ** ", "^").replace(" * ", " ")
-    return f"{number} {unit or 'dimensionless'}"
+    size = float((1.0 * quantity.units).to_base_units().magnitude)
+    for unit in (f"{quantity.units:~D}", f"{quantity.units:D}"):  # a short name may be that of two units
+        plain = unit.replace(" / ", "/").replace(" ** ", "^").replace(" * ", " ") or "dimensionless"
+        known = unit_of(plain)
+        if known is not None and math.isclose(float(known.size), size, rel_tol=1e-9):
+            return f"{number} {plain}"
+    raise ValueError("the unit is another one in this registry")
 
 
 @functools.cache
@@ -50,7 +56,7 @@ def unit_of(text: str) -> Unit | None:
     """A unit as text; None if Pint knows none of this name, or only one with another zero."""
     plain = _RAISED.sub(lambda match: f"^{match[0].translate(_PLAIN)}", text.replace("**", "^"))
     plain = re.sub(r"[·⋅×]|(?<=[^\W\d])\.(?=[^\W\d])", "*", plain)
-    if not _UNIT.fullmatch(plain):
+    if not _UNIT.fullmatch(plain) or re.search(r"\([^)]*\(", plain.replace("^(", "^[")):
         return None
     registry = _registry()
     try:

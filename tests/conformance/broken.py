@@ -261,6 +261,11 @@ class TakesNegativeIntensity(NoiseModel):
         return 1
 
 
+class CountsIntensityTwice(NoiseModel):
+    def amplitude(self, x, v):
+        return self.intensity**0.5
+
+
 class LacksARate(NoiseModel):
     extra_states: ClassVar = ("y", "w")
 
@@ -290,6 +295,7 @@ ImaginaryAmplitude = with_formula(NoiseModel, ImaginaryAmplitude=lambda noise, x
 
 NOISE_MODELS = [
     ("intensity", TakesNegativeIntensity),
+    ("intensity", CountsIntensityTwice),
     ("finite amplitude", ImaginaryAmplitude),
     ("finite amplitude", with_formula(NoiseModel, InfiniteAmplitude=lambda noise, x, v: 1 / x)),
     ("diffusion", ImaginaryAmplitude),

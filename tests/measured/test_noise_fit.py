@@ -108,7 +108,7 @@ def changed(array, place, value):
         (vk.WhiteNoise, TIMES[::-1], VALUES, "times must rise by equal steps"),
         (vk.WhiteNoise, TIMES, changed(VALUES, 9, math.nan), "values must be finite numbers, got nan at place 9"),
         (vk.WhiteNoise, TIMES, VALUES[1:], "of the same length, got shapes (2048,) and (2047,)"),
-        (vk.WhiteNoise, TIMES, ["a"] * 2048, "must be sequences of real numbers."),
+        (vk.WhiteNoise, TIMES, ["a"] * 2048, "must be sequences of real numbers, got an array of type"),
         (vk.WhiteNoise, TIMES, np.ones(2048), "the record is 1 throughout; there is no noise in it."),
         (vk.FilteredNoise, TIMES, VALUES, "the spectrum has no peak"),
     ],

@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 
+import numpy as np
 import pint
 import pytest
 
@@ -317,3 +318,64 @@ def test_records_of_one_motion_are_of_one_scene_whatever_units_it_was_given_in(t
         check_scene(
             "a record", dataclasses.replace(full_structure(), scene=scene_data(tube.replace(mass=0.7))), by_hand
         )
+
+
+def test_a_number_that_shapes_the_equations_does_not_wait_for_the_mass():
+    class Shaped(vk.Spring):
+        stiffness: float = vk.parameter("k", "s^-2", structural=True)
+
+        def force(self, x, v):
+            return self.stiffness * x
+
+    assert Shaped("4 1/s^2").stiffness == 4.0
+    with pytest.raises(
+        ParameterError, match=r"Shaped: stiffness shapes the equations.*per unit mass, in s\^-2, got 4 N/m"
+    ):
+        Shaped("4 N/m")
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        lambda: vk.KelvinVoigt("2 MN/m", "12 N s/m").rebound(),
+        lambda: vk.WhiteNoise("1e-3 N^2/Hz").psd,
+        lambda: vk.WhiteNoise("1e-3 N^2/Hz").density(1.0),
+    ],
+)
+def test_nothing_is_computed_before_the_mass_is_known(asked):
+    with pytest.raises(ParameterError, match="there is no mass yet; ask the part of a scene that has one"):
+        asked()
+
+
+@pytest.mark.parametrize("mass", [1e-320, 1e-200])
+def test_a_mass_by_which_a_number_becomes_infinite(mass):
+    with pytest.raises(ParameterError, match="stiffness must be a finite number"):
+        vk.Oscillator(mass=mass, stiffness="6e200 N/m", damping_ratio=0.1)
+    with pytest.raises(ParameterError, match="intensity must be a finite number"):
+        vk.Oscillator(mass=mass, natural_frequency=1.0, damping_ratio=0.1, noise=vk.WhiteNoise("1 N^2/Hz"))
+
+
+@pytest.mark.parametrize(
+    ("path", "unit"),
+    [("amplitude", "N"), ("frequency", "N s/m"), ("frequency", "2 Hz"), ("frequency", pint.Unit("Hz"))],
+)
+def test_units_of_a_sweep_are_those_that_the_parameter_takes(path, unit):
+    shaken = vk.Oscillator(
+        mass=0.35, natural_frequency=1.0, damping_ratio=0.1, excitations=[vk.SupportAcceleration(1.0, 0.5)]
+    )
+    with pytest.raises(ParameterError, match="unit"):
+        vk.sweep(shaken, path, [1.0, 2.0], unit=unit, energies=False)
+
+
+def test_arrays_with_units_are_not_taken_for_their_numbers():
+    units, osc = pint.UnitRegistry(), vk.Oscillator(natural_frequency=1.0, damping_ratio=0.1)
+    times = np.linspace(0, 10, 1024)
+    for asked in (
+        lambda: osc.trajectory(units.Quantity(np.array([1.0, 0.0]), "mm"), duration=1.0),
+        lambda: vk.WhiteNoise.from_record(units.Quantity(times, "ms"), np.sin(times)),
+        lambda: vk.Periodic.from_samples(times, units.Quantity(np.sin(times), "N")),
+        lambda: vk.WhiteNoise.from_record(times, np.ma.masked_less(np.sin(times), 0)),
+        lambda: vk.WhiteNoise.from_record(times, np.sin(times) + 0j),
+    ):
+        with pytest.raises(ParameterError, match=r"with units; give its numbers|masked|of type complex"):
+            asked()

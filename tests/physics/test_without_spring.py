@@ -148,7 +148,6 @@ def test_a_motion_beside_a_family():
     assert [(one.name, one.hits) for one in found.attractors] == [("hammering", {"left": 1, "right": 1})]
     told = {finding.code: finding.values for finding in found.findings}
     assert 0 < told[Code.STARTS_NEUTRAL]["count"] < told[Code.STARTS_NEUTRAL]["starts"] == 144
-    assert Code.FOLLOWED_ON not in told
     assert 0 < told[Code.CELLS_UNSETTLED]["fraction"] < 1 - found.attractors[0].basin_fraction + 1e-12
 
 

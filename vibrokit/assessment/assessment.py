@@ -264,7 +264,7 @@ class Assessment(Record):
     def to_dataset(self) -> xarray.Dataset:
         """Return the arrays of the structure and of all results."""
         whole = nested({STRUCTURE: self.structure, **self.results})
-        reached = np.array([self._reached(name) for name in self.results]).reshape(-1, len(self.names))
+        reached = np.array([self._reached(name) for name in self.results]).reshape(len(self.results), len(self.names))
         return whole.assign(reached=(("result", "state"), reached, {"long_name": "accuracy of a finished analysis"}))
 
     @classmethod

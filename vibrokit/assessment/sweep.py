@@ -19,7 +19,6 @@ from vibrokit.construction import called
 from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.oscillator import Oscillator
 from vibrokit.progress import Progress, Work, advance, stage, working
-from vibrokit.quantity import size_of
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Continuation
@@ -109,7 +108,7 @@ def sweep(
     """
     check_means(osc, None, None)
     line, seed = parameter_line("sweep", osc, parameter), seed_of(rng)
-    size = 1.0 if unit is None else size_of(unit, line.entry.declared.unit, osc.mass)
+    size = 1.0 if unit is None else line.entry.declared.size_of(unit, osc.mass)
     numbers = size * ordered_values("sweep", values)
     wanted = energies and osc.noise is not None
     listed = None if search is None else (size * ordered_values("sweep: search", search)).tolist()

@@ -17,7 +17,6 @@ from vibrokit.assessment.plausibility import plausibility
 from vibrokit.assessment.sweep import sweep
 from vibrokit.cli.long_work import Interrupts, check_targets, scene_stem, source_of
 from vibrokit.errors import ParameterError, shown
-from vibrokit.quantity import number_in, size_of
 from vibrokit.report.assessment import Question, assessment_data, assessment_text
 from vibrokit.report.text import record_text
 from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, reproduce
@@ -73,17 +72,17 @@ def sweep_scene(options: argparse.Namespace) -> int:
         raise ParameterError(f"--count must be a whole number, at least 2, got {options.count}.")
     osc = load_scene(options.scene)
     line = parameter_line("sweep", osc, _parameter(options.parameter))
-    base = line.entry.declared.unit
+    declared = line.entry.declared
     (first, unit), (last, other) = (
-        number_in(line.path, text, base, osc.mass) for text in (options.start, options.stop)
+        declared.number_in(line.path, text, osc.mass) for text in (options.start, options.stop)
     )
     if unit != other:
         raise ParameterError(f"{options.start} and {options.stop} have different units; give both in one unit.")
     listed = options.search.split(",") if options.search else []
-    searched = [number_in(f"--search of {line.path}", text, base, osc.mass) for text in listed]
+    searched = [declared.number_in(f"--search of {line.path}", text, osc.mass) for text in listed]
     if any(own != unit for _, own in searched):
         raise ParameterError(f"--search {options.search} has another unit than {options.start}; give both in one unit.")
-    size = 1.0 if unit is None else size_of(unit, base, osc.mass)
+    size = 1.0 if unit is None else declared.size_of(unit, osc.mass)
     with Interrupts() as interrupts:
         with interrupts.working(options.time_limit):
             found = sweep(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, counted, shown
+from vibrokit.measured.real_array import real_array
 
 MOST_HARMONICS = 100
 _FEWEST = 8  # samples
@@ -151,9 +152,9 @@ def _record(t: Any, f: Any, period: float | None) -> _Record:
 
 def _checked(t: Any, f: Any) -> tuple[Array, Array]:
     try:
-        times, force = (np.asarray(one, dtype=np.float64) for one in (t, f))
+        times, force = (real_array(one) for one in (t, f))
     except (TypeError, ValueError) as error:
-        raise ParameterError("Periodic: times and forces must be sequences of real numbers.") from error
+        raise ParameterError(f"Periodic: times and forces must be sequences of real numbers, got {error}.") from error
     if times.ndim != 1 or times.shape != force.shape:
         raise ParameterError(
             f"Periodic: times and forces must be of one dimension and of the same length, got shapes {times.shape} and "

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrokit.errors import ParameterError
+from vibrokit.measured.real_array import real_array
 
 _JITTER = 1e-3  # of a step: times that are printed with few digits
 
@@ -24,9 +25,9 @@ class MeasuredRecord(NamedTuple):
 def checked_record(owner: str, t: Any, values: Any, fewest: int) -> MeasuredRecord:
     """Return a record; raises ParameterError unless it has finite values at equal steps, and enough of them."""
     try:
-        times, samples = (np.asarray(one, dtype=np.float64) for one in (t, values))
+        times, samples = (real_array(one) for one in (t, values))
     except (TypeError, ValueError) as error:
-        raise ParameterError(f"{owner}: times and values must be sequences of real numbers.") from error
+        raise ParameterError(f"{owner}: times and values must be sequences of real numbers, got {error}.") from error
     if times.ndim != 1 or times.shape != samples.shape:
         raise ParameterError(
             f"{owner}: times and values must be of one dimension and of the same length, got shapes {times.shape} and "

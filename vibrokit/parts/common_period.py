@@ -70,7 +70,7 @@ def common_ratios(first: float, second: float) -> tuple[Ratio, ...]:
     5/7 (off by 3.3e-03, a section of 0.07692 s)
     """
     slow, fast = sorted(_FREQUENCY.known("common_ratios", value) for value in (first, second))
-    if fast > MOST_CYCLES * slow:
+    if fast > MOST_CYCLES * slow or math.isinf(2 * math.pi / slow):
         raise ParameterError(
             f"common_ratios: one frequency may be at most {MOST_CYCLES} times the other, got {slow:g} and {fast:g}."
         )

@@ -68,6 +68,7 @@ class KelvinVoigt(ContactLaw):
     @called
     def rebound(self, adhesive: bool = False) -> float:
         """Coefficient of restitution of a free mass; 0 if it does not come back."""
+        self.check_settled("KelvinVoigt.rebound")
         if not self.stiffness:
             return 0.0
         ratio = self.damping / (2 * math.sqrt(self.stiffness))

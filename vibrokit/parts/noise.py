@@ -139,6 +139,7 @@ class WhiteNoise(StationaryNoise):
     @property
     def psd(self) -> float:
         """One-sided power spectral density 2D of the force per unit mass, in (m/s²)²/Hz."""
+        self.check_settled("WhiteNoise.psd")
         return 2 * self.intensity
 
     def density(self, frequency: Any) -> Any:

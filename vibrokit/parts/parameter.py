@@ -13,7 +13,7 @@ from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, shown
 from vibrokit.parts.formula import evaluate
-from vibrokit.quantity import Quantity, is_quantity, read
+from vibrokit.quantity import Quantity, is_quantity, number_in, read
 
 _KEY = "vibrokit.parameter"
 _NAMED = re.compile(r"\^\(([^()]*[^\W\d_][^()]*)\)")  # an exponent in which a parameter stands
@@ -81,6 +81,11 @@ class Parameter:
         )
         if outside:
             large = number == math.inf and not isinstance(value, float)
+            if isinstance(value, str):
+                raise ParameterError(
+                    f"{owner}: {self.name} must be {self.allowed}, got the text {shown(value)}; give a number, or a "
+                    "text with its unit, such as '0.25 mm'."
+                )
             given = "one above 1.8e308" if large else shown(value) if math.isnan(number) else f"{number:g}"
             raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {given}.")
         return number
@@ -113,7 +118,24 @@ class Parameter:
 
     def _quantity(self, owner: str, value: Any) -> float:
         number = read(f"{owner}: {self.name}", value, self.unit, self.mass_power)
-        return float(number) if self.structural else number
+        if not self.structural:
+            return number
+        if number.pending:
+            raise ParameterError(
+                f"{owner}: {self.name} shapes the equations, so that it cannot be divided by the mass later; give it "
+                f"per unit mass, in {self.unit}, got {number.text}."
+            )
+        return float(number)
+
+    def number_in(self, owner: str, text: str, mass: float | None) -> tuple[float, str | None]:
+        """Return the number that a text stands for, and its unit if it has one, for a mass (kg)."""
+        return number_in(owner, text, self.unit, mass, self.mass_power)
+
+    def size_of(self, unit: str, mass: float | None) -> float:
+        """Return the size in SI of a unit that the parameter may be given in; ParameterError for any other."""
+        if not isinstance(unit, str):
+            raise ParameterError(f"unit must be text, such as 'mm', got {shown(unit)}.")
+        return self.number_in("unit", f"1 {unit}", mass)[0]
 
 
 class Entry(NamedTuple):

@@ -124,6 +124,15 @@ class Part(ABC, metaclass=Constructed):
         """What the fields hold, by the name of each parameter; `parameters` needs SymPy for other people's parts."""
         return {declared.name: getattr(self, declared.attribute) for declared in self._declared}
 
+    def check_settled(self, owner: str) -> None:
+        """Raise ParameterError if a number waits for the mass of a scene, so that nothing is computed from it yet."""
+        for name, quantity in self.quantities.items():
+            if quantity.pending:
+                raise ParameterError(
+                    f"{owner}: {name} is {quantity.text}, and there is no mass yet; ask the part of a scene that has "
+                    "one."
+                )
+
     def of_mass(self, mass: float | None) -> Self:
         """Return the part in a scene of a mass (kg): forces that were given with units are divided by it."""
         divided = {name: value.of_mass(mass) for name, value in self.quantities.items() if value.mass_power}

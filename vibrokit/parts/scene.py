@@ -85,7 +85,7 @@ class Scene(OwnNumbers):
         for declared in NUMBERS:
             value = getattr(self, declared.name)
             if isinstance(value, Quantity):
-                object.__setattr__(self, declared.name, value.of_mass(mass))
+                object.__setattr__(self, declared.name, declared.checked("scene", value.of_mass(mass)))
         for name, part in self.single_parts.items():
             object.__setattr__(self, name, part.of_mass(mass))
         for name in ("barriers", "excitations"):

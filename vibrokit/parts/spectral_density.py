@@ -8,6 +8,7 @@ from typing import Any
 
 from vibrokit.errors import ParameterError, shown
 from vibrokit.parts.parameter import Parameter
+from vibrokit.quantity import per_mass
 
 _MASS = Parameter("mass", "mass", "m", "kg", above=0)
 _LEVEL = Parameter("level", "level", "S", "m^2 s^-4 Hz^-1", minimum=0)
@@ -49,4 +50,4 @@ def intensity_of(owner: str, level: Any, of: Any, mass: Any) -> float:
             f"{owner}: the density of a force, in N²/Hz, needs the mass that it acts on; give mass= in kg."
         )
     of_force = dataclasses.replace(_LEVEL, unit="kg^2 m^2 s^-4 Hz^-1")
-    return of_force.known(owner, level) / (2 * _MASS.known(owner, mass) ** 2)
+    return per_mass(of_force.known(owner, level), _MASS.known(owner, mass), 2) / 2

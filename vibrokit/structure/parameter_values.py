@@ -119,7 +119,10 @@ def ordered_values(caller: str, values: Any) -> NDArray[np.float64]:
         raise ParameterError(f"{caller}: values must be a sequence of numbers, one or more, got {shown(values)}.")
     for value in listed:
         if not math.isfinite(real(value)):
-            raise ParameterError(f"{caller}: values must be finite numbers, got {shown(value)}.")
+            raise ParameterError(
+                f"{caller}: values must be finite numbers, got {shown(value)}; give their unit by unit=, such as "
+                "unit='Hz'."
+            )
     numbers = np.sort([real(value) for value in listed])
     twice = numbers[:-1][np.diff(numbers) == 0]
     if twice.size:

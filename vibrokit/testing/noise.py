@@ -50,7 +50,7 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
         return Oscillator(natural_frequency=1.0, damping_ratio=0.05, noise=part, excitations=(Harmonic(0.2, 0.9),))
 
     def intensity(self) -> str:
-        """The model has an intensity, which may be 0 but not negative."""
+        """The model has an intensity, which may be 0 but not negative, and is no part of the amplitude."""
         part = self.samples[0]
         if "intensity" not in part.parameters:
             raise ConformanceError(f"{part!r} has no parameter 'intensity'; keep the one of NoiseModel.")
@@ -58,6 +58,11 @@ class NoiseModelChecks(PartChecks[NoiseModel]):
             part.replace(intensity=0.0)
         except VibrokitError as error:
             raise ConformanceError(f"{self.cls.__name__} refuses the intensity 0: {error}") from error
+        if self.symbols(part)["intensity"] in self.expression(part).free_symbols:
+            raise ConformanceError(
+                f"The amplitude of {part!r} depends on the intensity D, which multiplies the white noise "
+                "besides, as √D; leave D out of the amplitude."
+            )
         try:
             part.replace(intensity=-1.0)
         except VibrokitError:

@@ -68,6 +68,7 @@ class KuwabaraKono(ContactLaw):
     @called
     def rebound(self, speed: float) -> float:
         """Coefficient of restitution of a free mass that comes at `speed` (m s⁻¹); 0 if it does not come back."""
+        self.check_settled("KuwabaraKono.rebound")
         v = impact_speed(f"{type(self).__name__}.rebound", speed)
         return rebound_of_damping(self.dissipation * v**0.2 / self.stiffness**0.6) if self.stiffness else 0.0
 
