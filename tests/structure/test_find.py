@@ -246,11 +246,14 @@ RESTLESS = {  # rf-driven Josephson junction (Phys. Rev. A 36, 2455); megastable
 @pytest.mark.parametrize("name", RESTLESS)
 def test_a_search_that_is_stopped_says_what_its_starts_were_doing(name, tmp_path):
     osc = vk.Oscillator(**({"natural_frequency": 1.0, "damping_ratio": 0.1} | RESTLESS[name]))
-    vk.find_structure(osc, time_limit=0.1)  # so that what comes first is compiled
-    part = vk.find_structure(osc, time_limit=4.0)
-    assert not part.complete
-    assert part.seconds < 12.0
-    (counts,) = [dict(one.values) for one in part.found(Code.SEARCH_STOPPED)]
+    vk.find_structure(osc, time_limit=2.0)  # so that what comes first is compiled
+    for limit in (2.0, 3.0, 4.0, 6.0):  # a slow machine follows none for a period at first
+        part = vk.find_structure(osc, time_limit=limit)
+        assert not part.complete
+        assert part.seconds < limit + 4.0
+        (counts,) = [dict(one.values) for one in part.found(Code.SEARCH_STOPPED)]
+        if counts["periods"] > 0:
+            break
     assert counts["periods"] > 0
     assert counts["settled"] + counts["moving"] + counts["left"] + counts["diverged"] == counts["starts"] == 576
     part.save(tmp_path / "part.nc")

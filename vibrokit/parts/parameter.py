@@ -81,11 +81,6 @@ class Parameter:
         )
         if outside:
             large = number == math.inf and not isinstance(value, float)
-            if isinstance(value, str):
-                raise ParameterError(
-                    f"{owner}: {self.name} must be {self.allowed}, got the text {shown(value)}; give a number, or a "
-                    "text with its unit, such as '0.25 mm'."
-                )
             given = "one above 1.8e308" if large else shown(value) if math.isnan(number) else f"{number:g}"
             raise ParameterError(f"{owner}: {self.name} must be {self.allowed}, got {given}.")
         return number
