@@ -250,7 +250,7 @@ def test_a_search_that_is_stopped_says_what_its_starts_were_doing(name, tmp_path
     for limit in (2.0, 3.0, 4.0, 6.0):  # a slow machine follows none for a period at first
         part = vk.find_structure(osc, time_limit=limit)
         assert not part.complete
-        assert part.seconds < limit + 4.0
+        assert part.seconds < limit + 10.0  # what is compiled in it cannot be stopped
         (counts,) = [dict(one.values) for one in part.found(Code.SEARCH_STOPPED)]
         if counts["periods"] > 0:
             break
