@@ -112,7 +112,7 @@ LINE = np.linspace(0.0, PERIOD, 65)
         ({"t": LINE[:3], "f": known(LINE[:3])}, "8 samples or more, got 3"),
         ({"f": known(LINE)[:-1]}, "same length, got shapes"),
         ({"t": "noon"}, "sequences of real numbers"),
-        ({"f": np.where(LINE[7] == LINE, math.nan, known(LINE))}, "forces must be finite numbers, got nan at place 7"),
+        ({"f": np.where(LINE[7] == LINE, math.nan, known(LINE))}, "values must be finite numbers, got nan at place 7"),
         ({"t": np.where(LINE[7] == LINE, math.inf, LINE)}, "times must be finite numbers, got inf at place 7"),
         ({"t": LINE[::-1]}, "times must rise, got .* after 2.5"),
         ({"period": 1.9}, "no whole number of periods of 1.9 s, but 1.316 of them"),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, counted, shown
-from vibrokit.measured.real_array import real_array
+from vibrokit.measured.record import checked_samples
 
 MOST_HARMONICS = 100
 _FEWEST = 8  # samples
@@ -151,21 +151,7 @@ def _record(t: Any, f: Any, period: float | None) -> _Record:
 
 
 def _checked(t: Any, f: Any) -> tuple[Array, Array]:
-    try:
-        times, force = (real_array(one) for one in (t, f))
-    except (TypeError, ValueError) as error:
-        raise ParameterError(f"Periodic: times and forces must be sequences of real numbers, got {error}.") from error
-    if times.ndim != 1 or times.shape != force.shape:
-        raise ParameterError(
-            f"Periodic: times and forces must be of one dimension and of the same length, got shapes {times.shape} and "
-            f"{force.shape}."
-        )
-    if len(times) < _FEWEST:
-        raise ParameterError(f"Periodic: a record must have {_FEWEST} samples or more, got {len(times)}.")
-    for name, one in (("times", times), ("forces", force)):
-        wrong = np.flatnonzero(~np.isfinite(one))
-        if wrong.size:
-            raise ParameterError(f"Periodic: {name} must be finite numbers, got {one[wrong[0]]} at place {wrong[0]}.")
+    times, force = checked_samples("Periodic", t, f, _FEWEST)
     back = np.flatnonzero(np.diff(times) <= 0)
     if back.size:
         earlier, later = times[back[0] : back[0] + 2]

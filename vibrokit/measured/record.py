@@ -22,8 +22,8 @@ class MeasuredRecord(NamedTuple):
     step: float  # s
 
 
-def checked_record(owner: str, t: Any, values: Any, fewest: int) -> MeasuredRecord:
-    """Return a record; raises ParameterError unless it has finite values at equal steps, and enough of them."""
+def checked_samples(owner: str, t: Any, values: Any, fewest: int) -> tuple[Array, Array]:
+    """Return times and values of a record; raises ParameterError unless they are finite, and enough."""
     try:
         times, samples = (real_array(one) for one in (t, values))
     except (TypeError, ValueError) as error:
@@ -42,6 +42,12 @@ def checked_record(owner: str, t: Any, values: Any, fewest: int) -> MeasuredReco
                 f"{owner}: {name} must be finite numbers, got {one[wrong[0]]} at place {wrong[0]}; cut the record "
                 "there."
             )
+    return times, samples
+
+
+def checked_record(owner: str, t: Any, values: Any, fewest: int) -> MeasuredRecord:
+    """Return a record; raises ParameterError unless it has finite values at equal steps, and enough of them."""
+    times, samples = checked_samples(owner, t, values, fewest)
     steps = np.diff(times)
     step = float(steps.mean())
     if not step > 0 or np.abs(steps - step).max() > _JITTER * step:
