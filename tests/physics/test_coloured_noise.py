@@ -12,7 +12,7 @@ import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.errors import SceneError
 from vibrokit.kernels.choice import ensemble_stepper
@@ -59,7 +59,7 @@ def test_the_reference_itself(rate, energy):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate", [0.3, 1.0, 3.0, 30.0, slow(300.0)])
+@pytest.mark.parametrize("rate", [0.3, 1.0, 3.0, long(30.0), long(300.0)])
 def test_first_contact_under_coloured_noise(rate):
     result = least(contact(vk.ColouredNoise(1e-3, rate)))
     (energy,) = result.energies
@@ -71,7 +71,7 @@ def test_first_contact_under_coloured_noise(rate):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("frequency", "zeta"), [(1.0, 0.02), (0.5, 0.1), (4.0, 0.3)])
+@pytest.mark.parametrize(("frequency", "zeta"), [long(1.0, 0.02), (0.5, 0.1), long(4.0, 0.3)])
 def test_first_contact_under_a_narrow_band(frequency, zeta):
     (energy,) = least(contact(vk.FilteredNoise(1e-3, frequency, zeta))).energies
     assert energy.value == pytest.approx(0.5 / filtered(frequency, zeta)[0], rel=1e-8)
