@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, Self
 
@@ -154,10 +154,12 @@ def number_in(
     return float(found), name
 
 
-def size_of(unit: str, base: str | None, mass: float | None = None) -> float:
+def size_of(
+    unit: str, base: str | None, mass: float | None = None, mass_powers: Sequence[int | None] = (1, 2, None)
+) -> float:
     """Return the size of a unit in the SI base units of a parameter, such as 2π for Hz and ``"rad s^-1"``.
 
-    Whether the parameter may be divided by the mass is not asked: values that are shown have been read before.
+    `mass_powers` are those that are tried, as of `read`: by default any, because values that are shown have been read.
 
     Raises
     ------
@@ -166,10 +168,11 @@ def size_of(unit: str, base: str | None, mass: float | None = None) -> float:
     """
     if not isinstance(unit, str):
         raise ParameterError(f"a unit is given as text, such as 'mm', got {shown(unit)}.")
-    for power in (1, 2):
+    *others, last = mass_powers
+    for power in others:
         with contextlib.suppress(ParameterError):
             return number_in("unit", f"1 {unit}", base, mass, power)[0]
-    return number_in("unit", f"1 {unit}", base, mass)[0]
+    return number_in("unit", f"1 {unit}", base, mass, last)[0]
 
 
 def unit_in(text: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.plugins.metadata import write_metadata
 from vibrokit.analyzers.settings import analyzer_from, named_exit
 from vibrokit.cli import main
 from vibrokit.registry import Group, load
@@ -37,14 +38,7 @@ def installed(tmp_path, monkeypatch):
     project = tomllib.loads(snippets("toml")[0])["project"]
     exit_class = EXIT.partition("\n\n\nbox")[0]
     (tmp_path / "quadratic.py").write_text(f"{ANALYZER}\n\n{exit_class}\n")
-    info = tmp_path / f"{project['name']}-{project['version']}.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
-    groups = [
-        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in entries.items())
-        for group, entries in project["entry-points"].items()
-    ]
-    (info / "entry_points.txt").write_text("\n".join(groups))
+    write_metadata(tmp_path, project)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "quadratic", raising=False)
     monkeypatch.chdir(tmp_path)

@@ -10,6 +10,7 @@ import pytest
 
 import vibrokit as vk
 from tests.layers import long
+from tests.plugins.metadata import write_metadata
 from vibrokit.cli import main, new_plugin
 from vibrokit.cli.new_plugin import KINDS, plugin_files, plugin_names
 
@@ -26,14 +27,7 @@ def folder(tmp_path, monkeypatch):
 def installed(folder, monkeypatch):
     """Put the plug-in of a folder on the path, with the metadata that its pyproject.toml leads to."""
     project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
-    info = folder / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
-    groups = [
-        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in entries.items())
-        for group, entries in project["entry-points"].items()
-    ]
-    (info / "entry_points.txt").write_text("\n".join(groups))
+    write_metadata(folder, project)
     monkeypatch.syspath_prepend(folder)
     return {name: value for entries in project["entry-points"].values() for name, value in entries.items()}
 

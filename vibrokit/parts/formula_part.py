@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
@@ -26,10 +27,8 @@ class FormulaPart(NamedConstants):
         """Check formula and constants and store them."""
         check_parameter_names(tuple(constants), (*self.variables, "name", "formula", "constants"))
         read(formula, (*self.variables, *constants))
-        checked = tuple(
-            (name, Parameter(name, name, name, None).checked(type(self).__name__, value))
-            for name, value in constants.items()
-        )
+        owner = type(self).__name__
+        checked = tuple((name, self._constant(name).checked(owner, value)) for name, value in constants.items())
         object.__setattr__(self, "formula", formula)
         object.__setattr__(self, "constants", checked)
 
@@ -41,7 +40,9 @@ class FormulaPart(NamedConstants):
         """Parameters of this part: its own, the formula (structural), then each constant."""
         formula = Parameter(self.formula_name, "formula", self.formula_name, "", structural=True)
         shaping = in_exponents(self.formula, self.variables)
-        constants = (Parameter(name, name, name, None, structural=name in shaping) for name, _ in self.constants)
+        constants = (
+            dataclasses.replace(self._constant(name), structural=name in shaping) for name, _ in self.constants
+        )
         return (*self._own(), formula, *constants)
 
     def twin(self, values: Mapping[str, Any]) -> Self:

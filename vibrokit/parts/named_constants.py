@@ -23,8 +23,8 @@ class NamedConstants:
         return tuple(declared for declared in self._declared if declared.attribute != "constants")
 
     def _constant(self, name: str) -> Parameter:
-        """Declaration of one constant."""
-        return Parameter(name, name, name, "")
+        """Declaration of one constant; without a unit unless a subclass gives it one."""
+        return Parameter(name, name, name, None)
 
     def declared(self) -> tuple[Parameter, ...]:
         """Parameters of this part: its own, then each constant."""

@@ -13,7 +13,7 @@ from vibrokit.arguments import real
 from vibrokit.construction import called
 from vibrokit.errors import ParameterError, shown
 from vibrokit.parts.formula import evaluate
-from vibrokit.quantity import Quantity, is_quantity, number_in, read
+from vibrokit.quantity import Quantity, is_quantity, number_in, read, size_of
 
 _KEY = "vibrokit.parameter"
 _NAMED = re.compile(r"\^\(([^()]*[^\W\d_][^()]*)\)")  # an exponent in which a parameter stands
@@ -128,9 +128,7 @@ class Parameter:
 
     def size_of(self, unit: str, mass: float | None) -> float:
         """Return the size in SI of a unit that the parameter may be given in; ParameterError for any other."""
-        if not isinstance(unit, str):
-            raise ParameterError(f"unit must be text, such as 'mm', got {shown(unit)}.")
-        return self.number_in("unit", f"1 {unit}", mass)[0]
+        return size_of(unit, self.unit, mass, (self.mass_power,))
 
 
 class Entry(NamedTuple):

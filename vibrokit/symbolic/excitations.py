@@ -35,7 +35,7 @@ def excitation_force(
     force = derived_formula(part, "force", symbols, tuple(arguments[name] for name in part.variables))
     if len(part.variables) > 1:
         _check_smooth(part, force, symbols, state, reference_frequency)
-    check_period(part, force, {symbol: part.parameters[name] for name, symbol in symbols.items()}, time, state)
+    check_period(part, force, symbols, time, state)
     return force
 
 
@@ -45,7 +45,7 @@ def support_displacement(part: Excitation, symbols: Mapping[str, sympy.Symbol], 
     DerivationError is raised if its period is wrong, or if it has no derivative in time.
     """
     place = derived_formula(part, "support", symbols, (time,))
-    check_period(part, place, {symbol: part.parameters[name] for name, symbol in symbols.items()}, time, ())
+    check_period(part, place, symbols, time, ())
     if sympy.diff(place, time).has(sympy.Derivative, sympy.Subs, sympy.DiracDelta):
         plain = place.xreplace({symbol: sympy.Symbol(name) for name, symbol in symbols.items()})
         raise DerivationError(
@@ -93,7 +93,7 @@ def _check_smooth(
 def check_period(
     part: Excitation,
     force: sympy.Expr,
-    numbers: Mapping[sympy.Symbol, float],
+    symbols: Mapping[str, sympy.Symbol],
     time: sympy.Symbol,
     state: Sequence[sympy.Symbol],
 ) -> None:
@@ -106,6 +106,7 @@ def check_period(
         )
     if period is None or not math.isfinite(period):
         return
+    numbers = {symbol: part.parameters[name] for name, symbol in symbols.items()}
     for place in _STATES if part.depends_on_state else _STATES[:1]:
         at = _over_periods(force.subs(numbers).subs(dict(zip(state, place, strict=False))), time, period)
         change = max(abs(at(share + 1) - at(share)) for share in _SHARES)
