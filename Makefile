@@ -2,7 +2,9 @@
 # make test   style, types and layers (alone: make lint), and the tests of seconds (alone: make test-fast)
 # make test-slow   the tests that take longer; CI runs them too
 # make test-long   slow tests of ten seconds and more that CI leaves out: before a release, and after changes near to them
-# make docs   the manual, in docs/_build/html
+# make docs   the manual, in docs/_build/html: runs the tutorials and the gallery of scenes that have changed
+# make docs-check   the manual without running them; CI does it
+# make links  follow the manual's links to other sites
 # make clean  remove what these made
 
 PYTHON ?= python3
@@ -10,8 +12,9 @@ BIN := .venv/bin
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 PROJECTS := pyproject.toml $(addsuffix /pyproject.toml,$(PLUGINS))
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet
 
-.PHONY: demo test lint test-fast test-slow test-long docs clean
+.PHONY: demo test lint test-fast test-slow test-long docs docs-check links clean
 
 demo: .venv/demo.stamp
 	$(BIN)/vibrokit run hertz-0.570
@@ -36,10 +39,16 @@ test-long: .venv/test.stamp
 	$(BIN)/python -m pytest --numprocesses auto --dist load -m long
 
 docs: .venv/docs.stamp
-	$(BIN)/python -m sphinx -b html docs docs/_build/html
+	$(SPHINX) -b html docs docs/_build/html
+
+docs-check: .venv/docs.stamp
+	$(SPHINX) -D plot_gallery=0 -b html docs docs/_build/check
+
+links: .venv/docs.stamp
+	$(SPHINX) -D plot_gallery=0 -b linkcheck docs docs/_build/links
 
 clean:
-	rm -rf .venv build dist docs/_build docs/tutorials docs/findings.rst .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf .venv build dist docs/_build docs/tutorials docs/gallery docs/findings.rst docs/validation.rst docs/performance.rst docs/barriers.rst .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # A stamp says that what its target needs is installed; it ages when a pyproject.toml changes.
