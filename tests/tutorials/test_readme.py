@@ -1,6 +1,8 @@
 """Every snippet of the README and the manual does what it says."""
 
+import importlib.util
 import math
+import os
 import re
 import runpy
 import shlex
@@ -19,7 +21,19 @@ from vibrokit.results.codes import Code
 
 REPOSITORY = Path(__file__).parents[2]
 README = REPOSITORY / "README.md"
-PAGES = sorted([README, *REPOSITORY.glob("docs/*.rst"), *REPOSITORY.glob("docs/how-to/*.rst")])
+CONTRIBUTING = REPOSITORY / "docs/contributing.rst"
+FROM_SCRIPTS = {"docs/tutorials": "tutorials", "docs/gallery": "docs/scenes"}  # folders of pages, and of their scripts
+IGNORED = (REPOSITORY / ".gitignore").read_text(encoding="utf-8").splitlines()
+
+
+def made_by_the_build(page):
+    """Whether `make docs` writes a page; git ignores these."""
+    name = page.relative_to(REPOSITORY).as_posix()
+    return any(name == line or (line.endswith("/") and name.startswith(line)) for line in IGNORED)
+
+
+WRITTEN = [page for page in sorted(REPOSITORY.glob("docs/**/*.rst")) if not made_by_the_build(page)]
+PAGES = [README, *(page for page in WRITTEN if page.parent != REPOSITORY / "docs/scenes")]
 QUICK = ("list", "equations", "check")  # commands of seconds at most; of the others the words are checked
 LONG = ("assess", "density", "exit-times", "least-action", "reconcile", "structure")  # their Python takes the longest
 
@@ -42,7 +56,14 @@ def commands(page):
 def pages_with(language):
     """Pages that have snippets of a language."""
     pages = [page for page in PAGES if snippets(page, language)]
-    return [pytest.param(page, id=page.name, marks=[pytest.mark.long] * (page.stem in LONG)) for page in pages]
+    return [
+        pytest.param(
+            page,
+            id=page.relative_to(REPOSITORY).as_posix(),
+            marks=[pytest.mark.long] * (page.parent.name == "how-to" and page.stem in LONG),
+        )
+        for page in pages
+    ]
 
 
 def run_python(page, folder):
@@ -58,16 +79,16 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     made = run_python(page, tmp_path)
     printed = capsys.readouterr().out
+    how_to = page.stem if page.parent.name == "how-to" else None
     if page == README:
         assert made["osc"] == vk.load_scene("hertz-0.570")
         assert [state.impacts for state in made["states"].attractors] == [0, 2]
         assert made["result"].energies[0].value == pytest.approx(7.9052e-5, rel=1e-4)  # what the README says of it
         assert len(made["result"].found(Code.AGREEMENT)) == 1
-        assert float(made["Cubic"](stiffness=2.0).force(0.5, 1.0)) == 0.25
-    elif page.stem == "contact-law":
+    elif how_to == "contact-law":
         assert "False False 3/2" in printed
         assert "FAILED" not in printed
-    elif page.stem == "least-action":
+    elif how_to == "least-action":
         assert (made["r"].energies[0].source, made["r"].energies[0].target) == (0, 1)
         assert made["r"].energies[0].certificate.residual < 1e-9
         assert len(made["r"].found(Code.AGREEMENT)) == 1
@@ -75,12 +96,12 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert made["t"].energies == pytest.approx(np.array([[0, well], [well, 0]]), rel=1e-6)
         touch = 2 * 0.01 * (0.5 - 0.2 - 0.18 / abs(1 - 0.57**2 + 0.02j * 0.57)) ** 2
         assert made["touch"].energies[0].value == pytest.approx(touch, rel=1e-8)
-    elif page.stem == "density":
+    elif how_to == "density":
         energy = made["r"].energy("left-rest", "right-rest")
         assert energy.lower <= 4 * 0.05 * 0.25 <= energy.upper
         np.testing.assert_allclose(made["d"].occupancies, 0.5, rtol=1e-6)
         assert made["h"].times == pytest.approx(np.array([0.5, 1, 4]) * made["osc"].section_interval)
-    elif page.stem == "exit-times":
+    elif how_to == "exit-times":
         energy = made["r"].energy("left-rest", "right-rest")
         assert energy.lower <= 4 * 0.2 * 0.25 <= energy.upper
         np.testing.assert_allclose(vk.occupancies(made["r"]), 0.5, atol=0.08)  # 5 % of each rate, three errors
@@ -88,7 +109,7 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         assert made["rare"].rates[0].log_value == pytest.approx(-21.71, abs=3 * made["rare"].rates[0].log_error)
         assert "commitment" in printed
         assert "False True True" in printed
-    elif page.stem == "spring":
+    elif how_to == "spring":
         assert "FAILED" not in printed
         errors = dict(re.findall(r"^(\d\.0 \d+) (\S+)$", printed, re.MULTILINE))
         order = {k: math.log(float(errors[f"{k} 64"]) / float(errors[f"{k} 4096"]), 64) for k in ("4.0", "3.0")}
@@ -100,26 +121,26 @@ def test_python_snippets_run(page, tmp_path, monkeypatch, capsys):
         for steps, *shown in rows:  # the table of the page
             for k, error in zip(("4.0", "3.0"), shown, strict=True):
                 assert float(errors[f"{k} {steps}"]) == pytest.approx(float(error), rel=0.5)
-    elif page.stem == "friction":
+    elif how_to == "friction":
         assert float(printed.split()[-1]) == pytest.approx(2.0, rel=1e-7)
         assert "FAILED" not in printed
-    elif page.stem == "conformance-kit":
+    elif how_to == "conformance-kit":
         assert "Wave, an excitation, fails 1 of " in printed
         assert "but its force repeats after 1/2 of it" in printed
         assert "FAILED" not in printed
-    elif page.stem == "excitation":
+    elif how_to == "excitation":
         assert (made["found"].harmonics, made["found"].periods) == (3, 4)
         assert float(printed.split()[0]) == pytest.approx(3.0, abs=1e-6)
         assert "42/59 (off by 1.0e-04, a section of 0.6462 s)\n" in printed
         assert "never repeats, so there is no section" in printed
         assert "FAILED" not in printed
-    elif page.stem == "noise":
+    elif how_to == "noise":
         assert printed.splitlines()[0].split() == [str(0.25 / (2 * 0.35**2)), str(0.25 / 0.35**2)]
         assert made["e"].value == pytest.approx(0.110753, abs=1e-6)
         assert made["e"].lower == pytest.approx(0.1, rel=1e-6)
         assert made["estimate"].noise.rate == pytest.approx(3.0, abs=4 * made["estimate"].standard_errors["rate"])
         assert made["osc"].noise == made["estimate"].noise
-    elif page.stem == "steppers":
+    elif how_to == "steppers":
         assert "RK4: steps must be a whole number from 1 to 10000000, got 0." in printed
         errors = np.array(re.findall(r"^\d+ \[(\S+) +(\S+)\]", printed, re.MULTILINE), dtype=float)
         assert errors.shape == (3, 2)
@@ -140,6 +161,10 @@ def test_commands_do_what_they_say(line, tmp_path, monkeypatch, capsys):
     if program == "make":
         makefile = (REPOSITORY / "Makefile").read_text(encoding="utf-8")
         assert re.search(rf"^{words[0]}:", makefile, re.MULTILINE)
+        return
+    if program == "python":
+        module = words[0] == "-m"
+        assert importlib.util.find_spec(words[1]) if module else (REPOSITORY / words[0]).exists()
         return
     assert program == "vibrokit"
     if words[0] in QUICK:
@@ -171,19 +196,90 @@ def test_toml_snippets_are_read(page, tmp_path):
             osc = vk.load_scene(path)
             rest = [[0.0] * len(osc.model.state)]
             assert osc.section_map(rest).shape == (1, len(osc.model.state))
-            if page.stem == "command-line":  # a steady state runs clear of the stop, and one hammers it
+            if (
+                page == REPOSITORY / "docs/how-to/command-line.rst"
+            ):  # a steady state runs clear of the stop, and one hammers it
                 found = vk.find_structure(osc, cells=(20, 20), rng=0)
                 assert [state.impacts for state in found.attractors] == [0, 2]
         else:
-            assert set(data) <= {"project", "barriers"}
+            assert set(data) <= {"project", "barriers", "excitations", "spring", "friction", "noise"}
 
 
 def test_files_that_the_readme_names_exist():
     text = README.read_text(encoding="utf-8")
-    named = set(re.findall(r"`((?:docs|tutorials|plugins)/[\w./-]*|[A-Z]+\.cff)`", text))
-    named |= set(re.findall(r"\]\((docs/[\w./-]+)\)", text))
-    assert {"docs/images/overview.png", "CITATION.cff", "docs/how-to/steppers.rst"} <= named
-    assert [name for name in sorted(named) if not (REPOSITORY / name).exists()] == []
+    named = set(re.findall(r"`((?:docs|tutorials|plugins)/[\w./-]*|[A-Z]+\.(?:cff|md))`", text))
+    links = {link for link in re.findall(r"\]\(([^)#\s]+)", text) if "://" not in link}
+    assert {"docs/images/overview.png", "docs/how-to/units.rst"} <= links
+    assert "CITATION.cff" in named
+    files = {REPOSITORY / name for name in named | links}
+    assert [str(file) for file in sorted(files) if not (file.exists() or made_by_the_build(file))] == []
+
+
+def pages_named_in(page):
+    """Paths of the pages that a page leads to, by links and by tables of contents, without the suffix."""
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(r":doc:`(?:[^`<]*<)?([^`<>]+)>?`", text)
+    for block in re.findall(r"^\.\. toctree::\n((?:\n|   .*\n)+)", text, re.MULTILINE):
+        entries = [line.strip() for line in block.splitlines()]
+        named += [re.sub(r".*<(.*)>", r"\1", line) for line in entries if line and not line.startswith(":")]
+    return [Path(os.path.normpath(_from(page, name))) for name in named]
+
+
+def files_named_in(page):
+    """Paths of the pictures and files that a page shows or offers."""
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(r"^ *\.\. (?:image|figure|include|literalinclude):: (\S+)$", text, re.MULTILINE)
+    named += re.findall(r":download:`(?:[^`<]*<)?([^`<>]+)>?`", text)
+    return [_from(page, name) for name in named if "://" not in name]
+
+
+def _from(page, name):
+    return REPOSITORY / "docs" / name[1:] if name.startswith("/") else page.parent / name
+
+
+def source_of(target):
+    """The file that a page is made from: itself, a script, or what the build writes."""
+    page = target.with_name(f"{target.name}.rst")
+    folder = FROM_SCRIPTS.get(target.parent.relative_to(REPOSITORY).as_posix())
+    if folder is None:
+        return REPOSITORY / "docs/conf.py" if made_by_the_build(page) else page
+    return REPOSITORY / folder / ("GALLERY_HEADER.rst" if target.name == "index" else f"{target.name}.py")
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.relative_to(REPOSITORY).as_posix())
+def test_links_and_pictures_exist(page):
+    assert [str(target) for target in pages_named_in(page) if not source_of(target).exists()] == []
+    assert [str(file) for file in files_named_in(page) if not file.exists()] == []
+
+
+def test_links_are_read(tmp_path):
+    """The test above sees links of each form."""
+    page = tmp_path / "page.rst"
+    page.write_text(
+        "A\n=\n\n:doc:`one`, :doc:`the other <../two>` and :doc:`/three`\n\n.. toctree::\n   :maxdepth: 1\n\n"
+        "   four\n   Five <five>\n\n.. image:: six.png\n   :alt: six\n\n:download:`it <seven.toml>`\n",
+        encoding="utf-8",
+    )
+    two, here = tmp_path.parent / "two", tmp_path
+    assert pages_named_in(page) == [here / "one", two, REPOSITORY / "docs/three", here / "four", here / "five"]
+    assert files_named_in(page) == [here / "six.png", here / "seven.toml"]
+
+
+def test_lines_that_register_are_those_of_the_project():
+    lines = re.findall(r'``([\w-]+ = "[\w.]+:\w+")``', CONTRIBUTING.read_text(encoding="utf-8"))
+    project = (REPOSITORY / "pyproject.toml").read_text(encoding="utf-8").splitlines()
+    assert len(lines) >= 7
+    assert [line for line in lines if line not in project] == []
+
+
+def test_the_changelog_and_the_citation_have_the_version():
+    changes = (REPOSITORY / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.search(r"^(\d\S*) \(.*\)\n-+$", changes, re.MULTILINE)[1] == vk.__version__
+    assert f"\nversion: {vk.__version__}\n" in (REPOSITORY / "CITATION.cff").read_text(encoding="utf-8")
+
+
+def test_the_readme_is_short():
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 120
 
 
 def test_the_picture_is_small():
