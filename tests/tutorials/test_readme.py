@@ -1,5 +1,6 @@
 """Every snippet of the README and the manual does what it says."""
 
+import ast
 import importlib.util
 import math
 import os
@@ -21,19 +22,26 @@ from vibrokit.results.codes import Code
 
 REPOSITORY = Path(__file__).parents[2]
 README = REPOSITORY / "README.md"
-CONTRIBUTING = REPOSITORY / "docs/contributing.rst"
-FROM_SCRIPTS = {"docs/tutorials": "tutorials", "docs/gallery": "docs/scenes"}  # folders of pages, and of their scripts
+DOCS = REPOSITORY / "docs"
 IGNORED = (REPOSITORY / ".gitignore").read_text(encoding="utf-8").splitlines()
 
 
 def made_by_the_build(page):
     """Whether `make docs` writes a page; git ignores these."""
     name = page.relative_to(REPOSITORY).as_posix()
-    return any(name == line or (line.endswith("/") and name.startswith(line)) for line in IGNORED)
+    return any(line in (name, page.name) or (line.endswith("/") and name.startswith(line)) for line in IGNORED)
 
 
-WRITTEN = [page for page in sorted(REPOSITORY.glob("docs/**/*.rst")) if not made_by_the_build(page)]
-PAGES = [README, *(page for page in WRITTEN if page.parent != REPOSITORY / "docs/scenes")]
+def from_scripts():
+    """The folders of pages that Sphinx-Gallery makes, and those of their scripts."""
+    for line in ast.parse((DOCS / "conf.py").read_text(encoding="utf-8")).body:
+        if isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) == "sphinx_gallery_conf":
+            conf = ast.literal_eval(line.value)
+    return {DOCS / pages: DOCS / own for pages, own in zip(conf["gallery_dirs"], conf["examples_dirs"], strict=True)}
+
+
+WRITTEN = [page for page in sorted(DOCS.glob("**/*.rst")) if not made_by_the_build(page)]
+PAGES = [README, *(page for page in WRITTEN if page.parent != DOCS / "scenes")]
 QUICK = ("list", "equations", "check")  # commands of seconds at most; of the others the words are checked
 LONG = ("assess", "density", "exit-times", "least-action", "reconcile", "structure")  # their Python takes the longest
 
@@ -196,9 +204,7 @@ def test_toml_snippets_are_read(page, tmp_path):
             osc = vk.load_scene(path)
             rest = [[0.0] * len(osc.model.state)]
             assert osc.section_map(rest).shape == (1, len(osc.model.state))
-            if (
-                page == REPOSITORY / "docs/how-to/command-line.rst"
-            ):  # a steady state runs clear of the stop, and one hammers it
+            if page == DOCS / "how-to/command-line.rst":  # a steady state runs clear of the stop, and one hammers it
                 found = vk.find_structure(osc, cells=(20, 20), rng=0)
                 assert [state.impacts for state in found.attractors] == [0, 2]
         else:
@@ -234,16 +240,16 @@ def files_named_in(page):
 
 
 def _from(page, name):
-    return REPOSITORY / "docs" / name[1:] if name.startswith("/") else page.parent / name
+    return DOCS / name[1:] if name.startswith("/") else page.parent / name
 
 
 def source_of(target):
     """The file that a page is made from: itself, a script, or what the build writes."""
     page = target.with_name(f"{target.name}.rst")
-    folder = FROM_SCRIPTS.get(target.parent.relative_to(REPOSITORY).as_posix())
+    folder = from_scripts().get(target.parent)
     if folder is None:
-        return REPOSITORY / "docs/conf.py" if made_by_the_build(page) else page
-    return REPOSITORY / folder / ("GALLERY_HEADER.rst" if target.name == "index" else f"{target.name}.py")
+        return DOCS / "conf.py" if made_by_the_build(page) else page
+    return folder / ("GALLERY_HEADER.rst" if target.name == "index" else f"{target.name}.py")
 
 
 @pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.relative_to(REPOSITORY).as_posix())
@@ -261,12 +267,12 @@ def test_links_are_read(tmp_path):
         encoding="utf-8",
     )
     two, here = tmp_path.parent / "two", tmp_path
-    assert pages_named_in(page) == [here / "one", two, REPOSITORY / "docs/three", here / "four", here / "five"]
+    assert pages_named_in(page) == [here / "one", two, DOCS / "three", here / "four", here / "five"]
     assert files_named_in(page) == [here / "six.png", here / "seven.toml"]
 
 
 def test_lines_that_register_are_those_of_the_project():
-    lines = re.findall(r'``([\w-]+ = "[\w.]+:\w+")``', CONTRIBUTING.read_text(encoding="utf-8"))
+    lines = re.findall(r'``([\w-]+ = "[\w.]+:\w+")``', (DOCS / "contributing.rst").read_text(encoding="utf-8"))
     project = (REPOSITORY / "pyproject.toml").read_text(encoding="utf-8").splitlines()
     assert len(lines) >= 7
     assert [line for line in lines if line not in project] == []
