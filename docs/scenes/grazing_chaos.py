@@ -3,9 +3,9 @@ Chaos beside a clear orbit
 ==========================
 
 A soft impact oscillator has one elastic stop, twenty times as stiff as its spring, and is driven below resonance. One
-steady state just misses the stop; the other one hits it and is chaotic. Their basins are finely mixed. The scene is that
-of S. L. T. de Souza, M. Wiercigroch, I. L. Caldas and J. M. Balthazar, *Chaos, Solitons & Fractals* 38, 2008
-(doi 10.1016/j.chaos.2007.01.022), with the numbers of the collection BasinsCollection.
+steady state just misses the stop; the other one hits it and is chaotic. Their basins are finely mixed. The scene is
+that of S. L. T. de Souza, M. Wiercigroch, I. L. Caldas and J. M. Balthazar, *Chaos, Solitons & Fractals* 38, 2008 (doi
+10.1016/j.chaos.2007.01.022), with the numbers of the collection BasinsCollection.
 """
 
 import matplotlib.pyplot as plt
@@ -24,7 +24,8 @@ structure = vk.find_structure(osc, region=((-1, 1), (-1, 1)), cells=(100, 100), 
 print(structure)
 
 # %%
-# The points of the chaotic attractor lie on a folded curve. Its largest Lyapunov exponent is positive.
+# The chaotic attractor consists of two small pieces, beside the point of the clear orbit. Its largest Lyapunov
+# exponent is positive.
 
 fig, ax = plt.subplots(figsize=(6.4, 5.2), layout="constrained")
 drawn = structure.plot(ax=ax)

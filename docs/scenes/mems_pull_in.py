@@ -2,10 +2,10 @@
 Pull-in of an electrostatic actuator
 ====================================
 
-A plate on a spring is attracted by a voltage across a gap :math:`h`. Above the pull-in voltage no equilibrium is left and
-the plate snaps to the electrode. Below it, noise can still drive the plate over the potential barrier. The numbers are
-those of set 2 of the transducers in V. Kolchuzhin's LMGT_MEMS_component_library: mass 1e-4 kg, spring 200 N/m, plates of
-1 cm² with a gap of 150 µm.
+A plate on a spring is attracted by a voltage across a gap :math:`h`. Above the pull-in voltage no equilibrium is left
+and the plate snaps to the electrode. Below it, noise can still drive the plate over the potential barrier. The numbers
+are those of set 2 of the transducers in V. Kolchuzhin's LMGT_MEMS_component_library: mass 1e-4 kg, spring 200 N/m,
+plates of 1 cm² with a gap of 150 µm.
 """
 
 import matplotlib.pyplot as plt
@@ -36,8 +36,8 @@ for voltage in voltages:
     energies.append(search.run(loaded, structure).energies[0].value)
 
 # %%
-# With linear damping and white noise, :math:`\Delta U = 4\zeta\omega_n\,\Delta V`, where :math:`\Delta V` is the height of
-# the barrier of :math:`V = \tfrac12\omega_n^2 x^2 - a/(h - x)`. It vanishes at the pull-in voltage.
+# With linear damping and white noise, :math:`\Delta U = 4\zeta\omega_n\,\Delta V`, where :math:`\Delta V` is the
+# height of the barrier of :math:`V = \tfrac12\omega_n^2 x^2 - a/(h - x)`. It vanishes at the pull-in voltage.
 
 
 def closed_form(voltage):
@@ -54,7 +54,7 @@ fine = np.linspace(250.0, pull_in - 0.01, 200)
 ax.plot(fine, [closed_form(voltage) for voltage in fine], color="0.5", label="closed form")
 ax.plot(voltages, energies, "o", label="least action")
 ax.axvline(pull_in, color="0.5", linestyle=":", label="pull-in")
-ax.set_xlabel("voltage $U$ (V)")
+ax.set_xlabel("voltage (V)")
 ax.set_ylabel(r"activation energy $\Delta U$ (m$^2$ s$^{-3}$)")
 legend = ax.legend()
 

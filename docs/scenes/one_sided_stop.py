@@ -2,10 +2,10 @@
 A one-sided stop at resonance
 =============================
 
-A mass on a spring is driven at its natural frequency and has one stop. The orbit that runs clear of the stop grows with
-the forcing until it grazes the stop. Beyond grazing the stop limits the displacement. The scene is the impact oscillator
-of Example 15.2 in *Recipes for Continuation* (H. Dankowicz and F. Schilder, SIAM, 2013), with a stiff elastic stop
-instead of a rigid one.
+A mass on a spring is driven at its natural frequency and has one stop. The orbit that runs clear of the stop grows
+with the forcing until it grazes the stop. Beyond grazing the stop limits the displacement. The scene is the impact
+oscillator of Example 15.2 in *Recipes for Continuation* (H. Dankowicz and F. Schilder, SIAM, 2013), with a stiff
+elastic stop instead of a rigid one.
 """
 
 import matplotlib.pyplot as plt
@@ -39,8 +39,8 @@ ax.set_ylabel(r"largest displacement $x$ (m)")
 legend = ax.legend()
 
 # %%
-# The clear orbit grazes the stop at :math:`x = 1` when its amplitude is 1, that is, at
-# :math:`f = \sqrt{(1 - \omega^2)^2 + (2\zeta\omega)^2}`, whatever the contact law.
+# The clear orbit grazes the stop at :math:`x = 1` when its amplitude is 1, that is, at :math:`f = \sqrt{(1 -
+# \omega^2)^2 + (2\zeta\omega)^2}`, whatever the contact law.
 
 grazing = next(each for each in sweep.bifurcations if each.kind == "grazing")
 exact = np.hypot(1 - frequency**2, 2 * damping * frequency)

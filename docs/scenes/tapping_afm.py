@@ -2,11 +2,10 @@
 Tapping-mode atomic force microscope
 ====================================
 
-The tip of a cantilever vibrates at its resonance, 300 kHz, close to a surface. Van der Waals forces attract it and, below
-0.3 nm, the surface repels it as a Hertzian contact (Derjaguin, Müller and Toporov). At the same drive the tip can stay
-clear of the surface or tap it. A change between the two states is a step in the image. Sources: U. D. Schwarz and H.
-Hölscher in *Applied Scanning Probe Methods*, 2007; A. San Paulo and R. García, *Physical Review B* 66, 041406, 2002; the
-numbers are those of AFMsimulations.jl.
+The tip of a cantilever vibrates at its resonance, 300 kHz, close to a surface. Van der Waals forces attract it and,
+below 0.3 nm, the surface repels it as a Hertzian contact (Derjaguin, Muller and Toporov). At the same drive the tip
+can stay clear of the surface or tap it. A change between the two states is a step in the image. The numbers are those
+of AFMsimulations.jl, after U. D. Schwarz and H. Hölscher (2007).
 """
 
 import math
@@ -30,7 +29,7 @@ osc = vk.Oscillator(
     ),
     excitations=(vk.Harmonic(amplitude=1.333e-9 / mass, frequency=1.0005 * natural),),
 )
-structure = vk.find_structure(osc, cells=(40, 40), manifolds=False)
+structure = vk.find_structure(osc, cells=(20, 20), saddles=False)
 print(structure)
 
 # %%

@@ -3,9 +3,9 @@ A valve with dry friction
 =========================
 
 A spring-loaded valve of 0.34 g moves between two seats 1.016 mm apart, under a pressure that pulsates at 250 Hz. Dry
-friction of 1 N acts on it, and each impact keeps 0.3 of the speed. The valve flies from seat to seat, bounces a few times
-and rests on its seat until the pressure rises. The scene is that of a user of DifferentialEquations.jl, whose event was
-missed so that the mass flew through the seat (SciML/DiffEqBase.jl, issue 634).
+friction of 1 N acts on it, and each impact keeps 0.3 of the speed. The valve flies from seat to seat, bounces, and
+rests until the pressure changes. The scene is that of a user of DifferentialEquations.jl, whose event was missed so
+that the mass flew through the seat (SciML/DiffEqBase.jl, issue 634).
 """
 
 import math
@@ -24,7 +24,7 @@ osc = vk.Oscillator(
     friction=vk.DryFriction(magnitude=1.0 / mass, width=1e-3),
     barriers=(vk.Barrier(seat, position=1.016e-3, side="right"), vk.Barrier(seat, position=0.0, side="left")),
     excitations=(
-        vk.Constant((18 * unit * area - 8.54503) / mass - 0.0),
+        vk.Constant((18 * unit * area - 8.54503) / mass),
         vk.Harmonic(4 * unit * area / mass, 2 * math.pi * 250, phase=-math.pi / 2),
     ),
 )
@@ -33,7 +33,7 @@ structure = vk.find_structure(osc, cells=(20, 20), starts=(6, 6), saddles=False)
 print(structure)
 
 # %%
-# Displacement over two periods, and the seats.
+# Displacement over two periods, and the seats. After the impact on the right seat friction holds the valve beside it.
 
 path = osc.trajectory(state.points[0], periods=2, samples=100_000)
 fig, ax = plt.subplots(layout="constrained")
@@ -44,8 +44,8 @@ ax.set_xlabel("time $t$ (ms)")
 label = ax.set_ylabel("displacement $x$ (mm)")
 
 # %%
-# Event stepping with rigid seats, in steps of 0.2 µs, gives impacts at 2.09 m/s on the right seat and at 2.30 m/s on the
-# left one. The elastic seats agree with it to about 2 %.
+# Event stepping with rigid seats, in steps of 0.2 µs, gives impacts at 2.09 m/s on the right seat and at 2.30 m/s on
+# the left one. The elastic seats agree with it to about 2 %.
 
 
 def impact_speed(depth, v):
