@@ -1,25 +1,40 @@
-"""A scene, its equations, a trajectory
+"""
+A scene, its equations, a trajectory
+====================================
 
-A mass on a spring moves between two stops. A constant force pushes it towards the right stop, a harmonic force drives
-it, and the stops push back by Hertz's law. At the same forcing the mass can settle into either of two motions: one runs
-clear of the stops, the other hammers the right stop. This tutorial composes the scene from parts, reads the derived
-equations, integrates trajectories, and finds both motions on the stroboscopic section.
+**Question:** Into which steady motions can a mass between two stops settle?
 
-Run it with ``python tutorials/01_a_scene.py``. It prints its results and saves two pictures.
+A mass on a spring moves between two stops. A constant force pushes it towards the right
+stop, and a harmonic force drives it. At the same forcing the mass has two steady states:
+one runs clear of the stops, the other hammers the right stop. This tutorial composes the
+scene from parts, reads the derived equations, finds both states, and compares them with
+closed forms.
+
+``python tutorials/01_a_scene.py`` prints the numbers of this page and then shows its
+pictures in windows. Without a display it only prints.
 """
 
-from pathlib import Path
+import textwrap
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import vibrokit as vk
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 1. The scene
+# %%
+# The scene
+# ---------
 #
-# A scene is a sum of parts: x″ + 2ζω_n x′ + ω_n² x = stops + excitations + noise, all per unit mass. The values are
-# those of a published example and are dimensionless. A stop is a contact law at a position: the law gives the force as
-# a function of depth, the barrier the position and the side of the mass.
+# A scene consists of parts. Per unit mass, its equation of motion is
+#
+# .. math::
+#
+#    \ddot x + 2\zeta\omega_n \dot x + \omega_n^2 x
+#    = \text{stops} + \text{excitations} + \text{noise}.
+#
+# The values below are dimensionless and come from a published example. A stop consists of
+# a contact law and a position. The law gives the contact force as a function of the
+# depth. The barrier holds the position and the side on which the stop is.
 
 osc = vk.Oscillator(
     natural_frequency=1.0,
@@ -28,110 +43,166 @@ osc = vk.Oscillator(
         vk.Barrier(vk.Hertz(stiffness=50.0), position=0.5, side="right"),
         vk.Barrier(vk.Hertz(stiffness=50.0), position=-0.5, side="left"),
     ),
-    excitations=(vk.Harmonic(amplitude=0.18, frequency=0.57), vk.Constant(force=0.2)),
+    excitations=(
+        vk.Harmonic(amplitude=0.18, frequency=0.57),
+        vk.Constant(force=0.2),
+    ),
     noise=vk.WhiteNoise(intensity=2e-5),
 )
 
+# %%
 # The toolkit contains the same scene as a file.
 
 assert osc == vk.load_scene("hertz-0.570")
 
-# Every parameter has a dotted name, its path. `replace` returns a new oscillator with some of them changed. An
-# unambiguous ending of the name is enough. Fields of the scene can be given by name, too.
+# %%
+# Each parameter has a dotted name.
 
-for path, value in osc.parameters.items():
-    print(f"{path:<28} {value:g}")
+for name, value in osc.parameters.items():
+    print(f"{name:<28} {value:g}")
+
+# %%
+# ``replace`` returns a new oscillator with other values. An unambiguous ending of the
+# dotted name is sufficient. Fields of the scene may be given by name.
 
 gentler = osc.replace({"amplitude": 0.1})
 assert gentler == osc.replace({"excitations.0.amplitude": 0.1})
 damped = osc.replace(damping_ratio=0.02, noise=vk.WhiteNoise(intensity=1e-4))
+print("ζ =", damped.parameters["damping_ratio"])
+print("D =", damped.parameters["noise.intensity"])
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 2. The equations
+# %%
+# The equations
+# -------------
 #
-# The equations are derived from the parts. For a scene with noise they are Hamilton's equations of the most probable
-# paths: p_1 and p_2 are momenta, S is the action. With p_1 = p_2 = 0 they are the equations of motion. Both stops push
-# the mass back: the right stop to the left, with a minus sign, the left stop to the right.
+# SymPy derives the equations from the parts. For a scene with noise they are Hamilton's
+# equations of the most probable paths, with the momentum :math:`p = (p_1, p_2)` and the
+# action :math:`S`. For :math:`p = 0` they are the equations of motion. Both stops push
+# the mass back: the right stop to the left, with a minus sign, and the left stop to the
+# right.
 
-print(osc.model)
+for equation in str(osc.model).splitlines():
+    print(textwrap.fill(equation, 86, subsequent_indent=" " * 8))
 
-# The terms are SymPy expressions; a notebook shows `osc.model` typeset. Stops that conserve energy do not change how
-# fast areas of the phase plane contract: the divergence of the drift is −2ζω_n everywhere.
+# %%
+# Stops that conserve energy do not change the rate at which areas of the phase plane
+# contract: the divergence of the drift is :math:`-2\zeta\omega_n` everywhere.
 
 divergence = osc.model.jacobian.trace()
 print("divergence of the drift:", divergence)
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 3. A trajectory
+# %%
+# A trajectory
+# ------------
 #
-# The mass starts at rest and is followed for 40 forcing periods. At t = 0 the harmonic force has its maximum. `RK4`
-# takes a fixed number of steps per period and compiles in one or two seconds. `Order8` and `FreeFlight` locate every
-# contact to ten digits and take longer to compile for a new kind of scene.
+# The mass starts at rest, at the maximum of the harmonic force, and is followed for 40
+# forcing periods. ``RK4`` takes a fixed number of steps per period. ``Order8`` and
+# ``FreeFlight`` are more accurate, locate every contact, and take longer to compile
+# (:doc:`/how-to/steppers`).
 
 start = osc.trajectory((0.0, 0.0), periods=40, stepper=vk.RK4(steps=256))
-print(f"from rest, x goes from {start.x.min():.3f} to {start.x.max():.3f}; the stops are at -0.5 and 0.5")
+print(f"from rest, x goes from {start.x.min():.3f} to {start.x.max():.3f}")
+print("the stops are at", start.stops)
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 4. The section map, and two steady states
+# %%
+# The section and two steady states
+# ---------------------------------
 #
-# Sampled once per forcing period, at t = 0, T, 2T, …, a periodic motion is a fixed point. `section_map` maps many
-# states at once. With weak damping transients are long: deviations decrease by exp(−ζω_n T) ≈ 0.9 per period, so 400
-# periods are sufficient. With 2048 steps per period the fixed points have at least six digits. `error_estimate`
-# compares with the next finer setting.
+# The stroboscopic section contains the states at the times 0, T, 2T, …, where
+# :math:`T = 2\pi/\omega` is the forcing period. A motion of period T is a fixed point of
+# the section map. ``section_map`` maps many states at once. Deviations from a steady
+# state without contact decrease by the factor :math:`e^{-\zeta\omega_n T} \approx 0.9`
+# per period, so that 400 periods are sufficient.
 
 fine = vk.RK4(steps=2048)
 starts = np.array([[0.45, 0.0], [0.0, 0.0]])
 clear, hammering = osc.section_map(starts, periods=400, stepper=fine)
 errors = osc.error_estimate([clear, hammering], stepper=fine)
-print("running clear: (x, v) =", clear, " error about", errors[0])
-print("hammering:     (x, v) =", hammering, " error about", errors[1])
+print(f"clear-running:  x = {clear[0]:.8f}, v = {clear[1]:.8f}")
+print(f"hammering:      x = {hammering[0]:.8f}, v = {hammering[1]:.8f}")
+print("largest error by the next finer steps:", f"{errors.max():.0e}")
 
-# The motion without contact is that of a linear oscillator: it oscillates about the static offset f₁/ω_n² = 0.2 with
-# the amplitude f₀/√((ω_n² − ω²)² + (2ζω_nω)²) = 0.266589, so its distance from the right stop is 0.0335.
+# %%
+# The clear-running state has no contact. It is the forced motion of a linear oscillator:
+# it oscillates about :math:`f_1/\omega_n^2` with the complex amplitude
+#
+# .. math::
+#
+#    X = \frac{f_0}{\omega_n^2 - \omega^2 + 2 i \zeta\omega_n\omega},
+#
+# where :math:`f_0` is the amplitude of the harmonic force, :math:`\omega` its frequency,
+# and :math:`f_1` the constant force.
+
+zeta, omega, f0, f1 = 0.01, 0.57, 0.18, 0.2  # ω_n = 1
+response = f0 / (1 - omega**2 + 2j * zeta * omega)
+exact = np.array([f1 + response.real, (1j * omega * response).real])
+print(f"clear-running:  x = {clear[0]:.10f}, v = {clear[1]:.10f}")
+print(f"closed form:    x = {exact[0]:.10f}, v = {exact[1]:.10f}")
 
 clear_orbit = osc.trajectory(clear, periods=1, samples=2048, stepper=fine)
-hammering_orbit = osc.trajectory(hammering, periods=1, samples=2048, stepper=fine)
 amplitude = np.ptp(clear_orbit.x) / 2
 offset = clear_orbit.x[:-1].mean()
-print(f"running clear: amplitude {amplitude:.6f} about {offset:.6f}")
+clearance = 0.5 - f1 - abs(response)
+print(f"amplitude {amplitude:.6f}, closed form {abs(response):.6f}")
+print(f"offset    {offset:.6f}, closed form {f1:.6f}")
+print(f"clearance to the right stop: {clearance:.4f}")
+
+# %%
+# The filled circles below are the states on the section. The hammering state crosses the
+# right stop twice per period.
+
+hammering_orbit = osc.trajectory(hammering, periods=1, samples=2048, stepper=fine)
+
+fig, ax = plt.subplots(layout="constrained")
+for orbit, name in ((clear_orbit, "clear-running"), (hammering_orbit, "hammering")):
+    (line,) = ax.plot(orbit.x, orbit.v, label=name)
+    ax.plot(orbit.x[0], orbit.v[0], "o", color=line.get_color())
+for stop in clear_orbit.stops:
+    ax.axvline(stop, color="0.55", linestyle="--", label="stop" if stop > 0 else None)
+ax.set(xlabel="displacement $x$ (m)", ylabel="velocity $v$ (m/s)")
+ax.legend(loc="lower left")
 
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 5. Stop hits
-#
-# A hit is an entry into contact. The hammering state hits the right stop twice per period and never reaches the left
-# stop.
+# %%
+# A hit is an entry into contact.
 
 
 def hits(orbit):
     """Count the entries into contact with the right and the left stop."""
-    left, right = min(orbit.stops), max(orbit.stops)
-    return tuple(int(np.sum(~touching[:-1] & touching[1:])) for touching in (orbit.x > right, orbit.x < left))
+    left, right = orbit.stops[1], orbit.stops[0]
+    contacts = (orbit.x > right, orbit.x < left)
+    return tuple(int(np.sum(~now[:-1] & now[1:])) for now in contacts)
 
 
-print("hits of the right and left stop, running clear:", hits(clear_orbit), " hammering:", hits(hammering_orbit))
+print("hits of the right and the left stop per period")
+print("    clear-running:", hits(clear_orbit))
+print("    hammering:    ", hits(hammering_orbit))
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 6. Two independent checks
+# %%
+# Two checks
+# ----------
 #
-# Energy: over one period of a steady state the work of the forcing equals the dissipation. The stops are conservative.
+# First, energy. The stops are conservative. Over one period of a steady state the work of
+# the forcing therefore equals the energy that the damping dissipates.
 
 
-def power_balance(orbit):
+def energy_balance(orbit):
     """Return the work of the forcing and the dissipation over one period."""
-    numbers = osc.parameters
-    push = numbers["excitations.0.amplitude"] * np.cos(numbers["excitations.0.frequency"] * orbit.t)
-    damping = 2 * numbers["damping_ratio"] * numbers["natural_frequency"] * orbit.v
-    return np.trapezoid(push * orbit.v, orbit.t), np.trapezoid(damping * orbit.v, orbit.t)
+    work = np.trapezoid(f0 * np.cos(omega * orbit.t) * orbit.v, orbit.t)
+    dissipation = np.trapezoid(2 * zeta * orbit.v**2, orbit.t)
+    return work, dissipation
 
 
-for name, orbit in (("running clear", clear_orbit), ("hammering", hammering_orbit)):
-    work, loss = power_balance(orbit)
-    print(f"{name}: work of the forcing {work:.6f} per period, dissipation {loss:.6f}")
+for name, orbit in (("clear-running", clear_orbit), ("hammering", hammering_orbit)):
+    work, dissipation = energy_balance(orbit)
+    print(f"{name:<14} work {work:.6f}, dissipation {dissipation:.6f}")
 
-# Areas: because of the divergence above, a small area of the section contracts by exp(−2ζω_n T) per period. The
-# derivative of the section map, here by central differences, must have this determinant. Its eigenvalues, the
-# multipliers, lie inside the unit circle: both states are stable.
+# %%
+# Second, areas. Let :math:`M` be the derivative of the section map at the fixed point.
+# Because the divergence of the drift is constant, an area on the section contracts by
+# :math:`\det M = e^{-2\zeta\omega_n T}` per period. The eigenvalues of :math:`M` are the
+# multipliers of the steady state. It is stable if they lie inside the unit circle. Here
+# :math:`M` is computed by central differences.
 
 
 def map_derivative(point, step=1e-5):
@@ -141,65 +212,48 @@ def map_derivative(point, step=1e-5):
     return np.column_stack([east - west, north - south]) / (2 * step)
 
 
-clear_derivative, hammering_derivative = map_derivative(clear), map_derivative(hammering)
-for name, derivative in (("running clear", clear_derivative), ("hammering", hammering_derivative)):
-    multipliers = np.linalg.eigvals(derivative)
-    print(f"{name}: areas contract by {np.linalg.det(derivative):.6f} per period; multipliers {multipliers.round(4)}")
-print(f"exp(-2 zeta omega_n T) = {np.exp(-2 * 0.01 * osc.period):.6f}")
+derivatives = {
+    "clear-running": map_derivative(clear),
+    "hammering": map_derivative(hammering),
+}
+contraction = np.exp(-2 * zeta * osc.period)
+for name, M in derivatives.items():
+    sizes = np.abs(np.linalg.eigvals(M))
+    print(f"{name:<14} det M = {np.linalg.det(M):.7f}, exact {contraction:.7f}")
+    print(f"{'':<14} absolute values of the multipliers {sizes.round(4)}")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 7. Noise
+# %%
+# Noise
+# -----
 #
-# With a seed (`rng=`) the same call adds noise of the scene's intensity D. The mass starts on the clear-running motion
-# and stays near it for some time. Then the noise drives it out, and it hammers. Another seed gives another exit time.
-# Only the hammering motion reaches x < -0.3, which shows when the transition happened.
+# With a seed (``rng=``) the same call adds the noise of the scene, of intensity D. The
+# mass starts in the clear-running state and stays near it for some time. Then the noise
+# drives it out, and the mass hammers the right stop. Another seed gives another time.
+# Only the hammering motion reaches :math:`x < -0.3`, which shows when the transition has
+# happened.
 
-shaken = osc.trajectory(clear, periods=80, rng=10, stepper=vk.RK4(steps=256))
-far_left = shaken.x < -0.3
-jump = shaken.t[np.argmax(far_left)] / osc.period if far_left.any() else np.inf
-print(f"with noise, it leaves the clear-running motion within {jump:.1f} periods")
+noisy = osc.trajectory(clear, periods=80, rng=10, stepper=vk.RK4(steps=256))
+far_left = noisy.x < -0.3
+jump = noisy.t[np.argmax(far_left)] / osc.period if far_left.any() else np.inf
+print(f"hammering begins before t = {jump:.1f} T")
 
-# The mean exit time grows like exp(ΔU/D) as D decreases. ΔU is the activation energy, one number for each state.
-# `vk.find_structure(osc)` finds the steady states and their basins, and `vibrokit run hertz-0.570` also computes ΔU.
+fig, ax = plt.subplots(layout="constrained")
+ax.plot(noisy.t / osc.period, noisy.x, linewidth=0.8)
+for stop in noisy.stops:
+    ax.axhline(stop, color="0.55", linestyle="--")
+ax.set(xlabel="time $t/T$", ylabel="displacement $x$ (m)")
 
-
-# ---------------------------------------------------------------------------------------------------------------------
-# 8. Pictures
+# %%
+# What you saw
+# ------------
 #
-# Every plotting function draws into the axes that it is given.
+# * A scene is composed of parts; its equations are derived from them.
+# * At the same forcing there are two steady states, one without contact. It agrees with
+#   the closed form to ten digits.
+# * Weak noise makes the mass change from one state to the other, at a random time.
+#
+# The mean of this time grows like :math:`e^{\Delta U/D}` as D decreases. The activation
+# energy :math:`\Delta U` is one number for each state; :doc:`04_least_action` computes
+# it. The next tutorial, :doc:`02_your_own_contact_law`, changes the stops.
 
-
-def draw_states(axes):
-    """Draw the two steady states in the phase plane, their points on the section, and the stops."""
-    from vibrokit.plots.portraits import phase_portrait
-
-    for label, (name, orbit) in enumerate((("runs clear", clear_orbit), ("hammers", hammering_orbit))):
-        line = phase_portrait(orbit.x, orbit.v, stops=orbit.stops, label=label, ax=axes).line
-        line.set_label(name)
-        axes.plot(orbit.x[0], orbit.v[0], "o", color=line.get_color(), markeredgecolor="white")
-    axes.legend(loc="lower left", fontsize=8)
-
-
-def draw_jump(axes):
-    """Draw displacement against time: first near the clear-running motion, later hammering."""
-    axes.plot(shaken.t / osc.period, shaken.x, linewidth=0.8)
-    for stop in shaken.stops:
-        axes.axhline(stop, color="0.55", linewidth=1.0, linestyle="--")
-    axes.set_xlabel(r"time $t / T$")
-    axes.set_ylabel(r"displacement $x$ (m)")
-
-
-def save_pictures(folder):
-    """Save both pictures in a folder and print where they are."""
-    from matplotlib.figure import Figure
-
-    folder.mkdir(exist_ok=True)
-    for draw, name in ((draw_states, "01-steady-states.png"), (draw_jump, "01-jump.png")):
-        figure = Figure(figsize=(6.0, 4.2), layout="constrained")
-        draw(figure.add_subplot())
-        figure.savefig(folder / name, dpi=150)
-        print("picture:", folder / name)
-
-
-if __name__ == "__main__":
-    save_pictures(Path.cwd() / "tutorial-pictures")
+plt.show()
