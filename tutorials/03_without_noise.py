@@ -1,130 +1,168 @@
-"""What the system does without noise
+"""
+What the system does without noise
+==================================
 
-The stability of a steady state against noise depends on the motion without noise: how many steady states there are,
-which starts lead to each of them, and what separates them. This tutorial finds all of this with `find_structure` for
-the scene of the first tutorial, checks the numbers independently, computes the smallest kick that leaves each state,
-and follows the states as the forcing frequency changes.
+**Question:** Which steady states does a scene have, which starts lead to each of them, and
+what separates them?
 
-Run it with ``python tutorials/03_without_noise.py``. It prints its results and saves four pictures.
+The stability of a steady state against noise depends on the motion without noise. This
+tutorial computes the structure of the scene of the first tutorial: attractors, basins and
+the saddle between them. It compares the numbers with closed forms, computes the smallest
+kick that leaves each basin, and follows the states as the forcing frequency changes.
+
+``python tutorials/03_without_noise.py`` prints the numbers of this page and then shows
+its pictures in windows. Without a display it only prints.
 """
 
-from pathlib import Path
-
+import matplotlib.pyplot as plt
 import numpy as np
 
 import vibrokit as vk
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 1. The structure of a scene
+# %%
+# The structure of a scene
+# ------------------------
 #
-# The search integrates a grid of starts until each recurs on the stroboscopic section, and refines the orbits by
-# Newton's method. It then computes the attractor of every cell of a grid (the basins), follows the basin boundaries to
-# the saddles on them, and grows the manifolds of the saddles. The status lists what was found.
+# ``find_structure`` integrates a grid of starts until each motion recurs on the section,
+# and refines the orbits by Newton's method. It computes the attractor of each cell of a
+# grid (the basins), follows the basin boundary to the saddle on it, and grows the stable
+# and the unstable manifold of the saddle.
 
 osc = vk.load_scene("hertz-0.570")
 structure = vk.find_structure(osc, rng=0)
 print(structure.status)
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 2. The attractors
+# %%
+# The picture shows the section. Each point is a start; its pale colour is the state to
+# which it leads. The clear-running state has a narrow, winding basin. Its boundary is the
+# stable manifold of the saddle.
+
+fig, ax = plt.subplots(layout="constrained")
+structure.plot(ax=ax)
+
+# %%
+# The attractors
+# --------------
 #
-# `name` describes what the attractor does. `period` is in forcing periods, `hits` counts the entries into contact with
-# each stop per orbit. The largest multiplier is the factor by which a small deviation decreases per period. `residual`
-# is the closing error, and `error` the change when the integration tolerance is reduced by a factor of 100.
+# ``name`` describes the motion. ``period`` is in forcing periods. ``hits`` counts the
+# entries into contact with each stop per orbit. The share of the region that the basin
+# covers has a standard error, since it is counted on cells.
 
 for a in structure.attractors:
-    share = f"{100 * a.basin_fraction:.1f} ± {100 * a.basin_fraction_error:.1f} %"
-    print(f"{a.name}: {a.kind}, period {a.period}, hits {dict(a.hits)}, basin {share}")
-    print(f"    at {a.points[0]}, largest multiplier {np.abs(a.multipliers).max():.4f}")
-    print(f"    largest depth {max(a.peak_depth.values()):.4f}, largest force {max(a.peak_force.values()):.3f}")
-    print(f"    residual {a.residual:.1e}, error {a.error:.1e}")
+    share, error = 100 * a.basin_fraction, 100 * a.basin_fraction_error
+    print(f"{a.name}: {a.kind}, period {a.period}, hits {dict(a.hits)}")
+    print(f"    basin {share:.1f} ± {error:.1f} % of the region")
+    print(f"    largest contact force per unit mass {max(a.peak_force.values()):.3f}")
+    print(f"    residual {a.residual:.0e}, error {a.error:.0e}")
 
-# The clear-running state has no contact. It is the forced motion of a linear oscillator, known in closed form.
+# %%
+# ``residual`` is the closing error of the orbit; ``error`` is its change when the
+# integration tolerance is reduced by a factor of 100. The clear-running state is that of
+# a linear oscillator, so that both can be compared with the true error.
 
 clear, hammering = structure.attractors
-numbers = osc.parameters
-frequency, damping = numbers["excitations.0.frequency"], 2 * numbers["damping_ratio"] * numbers["natural_frequency"]
-response = numbers["excitations.0.amplitude"] / (1 - frequency**2 + 1j * damping * frequency)
-formula = np.array([numbers["excitations.1.force"] + response.real, (1j * frequency * response).real])
-print("clear-running, from the formula:", formula, " difference:", np.abs(clear.points[0] - formula).max())
+zeta, omega, f0, f1 = 0.01, 0.57, 0.18, 0.2  # ω_n = 1
+response = f0 / (1 - omega**2 + 2j * zeta * omega)
+exact = np.array([f1 + response.real, (1j * omega * response).real])
+x, v = clear.points[0]
+print(f"clear-running:  x = {x:.12f}, v = {v:.12f}")
+print(f"closed form:    x = {exact[0]:.12f}, v = {exact[1]:.12f}")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 3. The saddle
+# %%
+# Both motions over one period, in the phase plane:
+
+fig, ax = plt.subplots(layout="constrained")
+structure.plot_orbits(ax=ax)
+
+# %%
+# The saddle
+# ----------
 #
-# Every path from one state to the other crosses the boundary of their basins. The cheapest path crosses it at a saddle,
-# an orbit with one multiplier outside the unit circle: a small deviation in that direction about doubles per period.
-# `leads_to` contains the attractors on either side.
+# The saddle is an unstable orbit on the basin boundary. One of its multipliers lies
+# outside the unit circle: a deviation in that direction grows by this factor per period.
+# The most probable exit path of each basin ends on it. ``leads_to`` has the attractors
+# on both sides.
 
 (saddle,) = structure.saddles
-print(f"saddle of period {saddle.period} at {saddle.points[0]}, between {saddle.leads_to}")
-print("    multipliers", saddle.multipliers.real, " residual", saddle.residual)
+x, v = saddle.points[0]
+print(f"saddle of period {saddle.period} at x = {x:.6f}, v = {v:.6f}")
+print("multipliers", saddle.multipliers.real.round(4))
+print("between the attractors", saddle.leads_to)
 
-# Elastic stops dissipate no energy, so areas contract by exp(−2ζω_n T) per period everywhere. The product of the
-# multipliers must equal this number at the attractors and at the saddle.
+# %%
+# The stops conserve energy. The product of the multipliers of each orbit of period T is
+# therefore :math:`e^{-2\zeta\omega_n T}`, at the attractors as well as at the saddle.
 
-shrinking = float(np.exp(-damping * osc.period))
-products = [float(np.prod(orbit.multipliers).real) for orbit in (clear, hammering, saddle)]
-print(f"areas contract by {shrinking:.8f} per period; products of multipliers:", np.round(products, 8))
+contraction = float(np.exp(-2 * zeta * osc.period))
+orbits = {"clear-running": clear, "hammering": hammering, "saddle": saddle}
+products = [float(np.prod(orbit.multipliers).real) for orbit in orbits.values()]
+for name, product in zip(orbits, products, strict=True):
+    print(f"{name:<14} product {product:.10f}, exact {contraction:.10f}")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 4. The smallest kick
+# %%
+# The smallest kick
+# -----------------
 #
-# A state with a large basin can still be close to the basin boundary. The smallest kick that leaves the basin, at the
-# least favourable time and direction, measures this distance. It differs from the activation energy: noise leaves the
-# basin by many small pushes, each at the right time.
+# A state with a large basin may still be close to the basin boundary. The smallest kick
+# that leaves the basin, in the least favourable direction and at the least favourable
+# time, measures this distance. It is not the activation energy: noise leaves the basin by
+# many small pushes, each at the right time.
 
 stability = vk.shape_stability(osc, structure)
 for s in stability:
-    print(
-        f"{structure.names[s.label]}: basin {100 * s.basin_fraction:.1f} %, smallest kick {s.any_kick.size:.4f} at "
-        f"t = {s.any_kick.time / osc.period:.2f} T; in velocity alone {s.velocity_kick.size:.4f}"
-    )
+    kick, push = s.any_kick, s.velocity_kick
+    print(f"{structure.names[s.label]}:")
+    print(f"    smallest kick {kick.size:.4f}, at t = {kick.time / osc.period:.2f} T")
+    print(f"    in velocity alone {push.size:.4f}")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 5. Continuation in the frequency
+# %%
+# Continuation in the frequency
+# -----------------------------
 #
-# `continuation` finds the steady states at each value of a parameter, joins them into branches, and locates
-# bifurcations. Towards the resonance the amplitude of the clear-running state grows until it grazes the right stop.
+# ``continuation`` finds the steady states at each value of a parameter, joins them into
+# branches and locates bifurcations.
 
-sweep = vk.continuation(osc, "excitations.0.frequency", np.linspace(0.57, 0.65, 9), cells=(40, 40), starts=(12, 12))
+frequencies = np.linspace(0.57, 0.65, 9)
+name = "excitations.0.frequency"
+sweep = vk.continuation(osc, name, frequencies, cells=(40, 40), starts=(12, 12))
 print(sweep.status)
 for bifurcation in sweep.bifurcations:
-    print("   ", bifurcation)
+    print(bifurcation)
 
-# Its amplitude f₀/√((ω_n² − ω²)² + (2ζω_nω)²) about the offset 0.2 reaches the stop at 0.5 when it equals 0.3.
+# %%
+# Towards the resonance the amplitude of the clear-running state grows until the orbit
+# grazes the right stop. This happens where the amplitude
+# :math:`f_0/\sqrt{(\omega_n^2 - \omega^2)^2 + (2\zeta\omega_n\omega)^2}` equals the
+# distance 0.3 from the offset to the stop, which is a quadratic equation in
+# :math:`\omega^2`.
 
-gap = 0.5 - numbers["excitations.1.force"]
-square = np.roots([1, damping**2 - 2, 1 - (numbers["excitations.0.amplitude"] / gap) ** 2])
-touching = float(np.sqrt(square.min()))
-print(f"grazing frequency by the formula: {touching:.10f}")
+squares = np.roots([1, 4 * zeta**2 - 2, 1 - (f0 / (0.5 - f1)) ** 2])
+grazing = float(np.sqrt(squares.min()))
+right = [b for b in sweep.bifurcations if b.kind == "grazing" and b.side == "right"]
+located = min((b.value for b in right), key=lambda value: abs(value - grazing))
+print(f"grazing: located at ω = {located:.10f}, closed form {grazing:.10f}")
 
+# %%
+# The branches show the displacement of each state on the section, and the shares show how
+# much of the region each basin covers.
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 6. Pictures
+fig, ax = plt.subplots(layout="constrained")
+sweep.plot(ax=ax)
+
+fig, ax = plt.subplots(layout="constrained")
+sweep.plot_fractions(ax=ax)
+
+# %%
+# What you saw
+# ------------
 #
-# The first picture shows the section: basins in pale colours, attractors and saddle as markers, the stable manifold of
-# the saddle (the basin boundary) and its unstable manifold, which leads to the attractors. The others show the motions
-# in the phase plane, the branches against the frequency, and the basin fractions.
+# * The scene has two attractors of period T and one saddle between their basins.
+# * The clear-running state, the products of the multipliers and the grazing frequency
+#   agree with closed forms.
+# * Basin size and smallest kick describe stability without noise. They are not the
+#   activation energy.
+#
+# :doc:`/how-to/structure` has more on this search. The next tutorial,
+# :doc:`04_least_action`, adds weak noise.
 
-PICTURES = {
-    "03-section.png": structure.plot,
-    "03-motions.png": structure.plot_orbits,
-    "03-branches.png": sweep.plot,
-    "03-basin-fractions.png": sweep.plot_fractions,
-}
-
-
-def save_pictures(folder):
-    """Save the pictures in a folder and print where they are."""
-    from matplotlib.figure import Figure
-
-    folder.mkdir(exist_ok=True)
-    for name, draw in PICTURES.items():
-        figure = Figure(figsize=(6.4, 5.0), layout="constrained")
-        draw(ax=figure.add_subplot())
-        figure.savefig(folder / name, dpi=150)
-        print("picture:", folder / name)
-
-
-if __name__ == "__main__":
-    save_pictures(Path.cwd() / "tutorial-pictures")
+plt.show()
