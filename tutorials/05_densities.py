@@ -1,45 +1,56 @@
-"""Densities and exit rates
+"""
+Densities and exit rates
+========================
 
-At a finite noise intensity D a state is left at some rate, and until then its density has a shape. `SGCM` computes
-both. Rates of interest are often below e⁻⁵⁰, which no simulated trajectory shows. This tutorial computes densities
-and rates of a double well, where both are known in closed form, follows them to the limit D → 0, and then compares the
-density of the impacting scene of the earlier tutorials with simulated trajectories.
+**Question:** At a given noise intensity, how is the state distributed, and at what rate is
+a steady state left?
 
-Run it with ``python tutorials/05_densities.py``. It prints its results and saves four pictures. It takes about half a
-minute, and longer the first time, when the equations are compiled.
+At finite noise intensity D each attractor has an exit rate and a density of the states
+that have not left. ``SGCM`` computes both, also where rates are below e⁻⁵⁰ and no
+simulated trajectory leaves. This tutorial computes densities and rates of a double well,
+where both are known in closed form, extrapolates them to D → 0, and compares a density of
+the scene with two stops with simulated trajectories.
+
+``python tutorials/05_densities.py`` prints the numbers of this page and then shows its
+pictures in windows. Without a display it only prints. It takes about half a minute, and
+longer the first time, when the equations are compiled.
 """
 
 import math
-from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import vibrokit as vk
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 1. Why the logarithm of the density is stored
+# %%
+# The logarithm of the density
+# ----------------------------
 #
-# The stationary density of an unforced oscillator is that of Boltzmann: p is proportional to exp(−4ζω_n E/D), where E
-# is the energy above the bottom of the well. The barrier of this well is 1/4, so that ln p at the saddle is ζ/D below
-# its maximum. With ζ = 0.2 and D = 0.004 this is 50.
-#
-# A density of e⁻⁵⁰ cannot be sampled: of 10²¹ independent samples, about one would be near the saddle. A transition
-# matrix of sampled trajectories has a zero there. `SGCM` stores ln p at the nodes of a grid and carries it along the
-# exact flow, so that the error of ln p is small at any depth. At several intensities:
+# Let E be the energy per unit mass above the bottom of the well. The stationary density of
+# an unforced oscillator is Boltzmann's: :math:`p \propto e^{-4\zeta\omega_n E/D}`. At the
+# saddle of this well :math:`E = 1/4`. With :math:`\zeta = 0.2` and D = 0.004 the density
+# there is e⁻⁵⁰ of its maximum. It cannot be sampled: of 10²¹ independent samples about one
+# would lie near the saddle. ``SGCM`` stores ln p on a grid and carries it along the exact
+# flow, so that the error of ln p is small at any depth.
 
 zeta, barrier = 0.2, 0.25
 well = vk.load_scene("double-well").replace({"damping_ratio": zeta})
-two_wells = vk.find_structure(well, cells=(60, 60), rng=0)
-(saddle,) = two_wells.saddles
-result = vk.SGCM(intensities=(0.01, 0.006, 0.004), nodes=(120, 120)).run(well, two_wells)
+wells = vk.find_structure(well, cells=(60, 60), rng=0)
+(saddle,) = wells.saddles
+search = vk.SGCM(intensities=(0.01, 0.006, 0.004), nodes=(120, 120))
+result = search.run(well, wells)
 print(result.status)
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 2. The density
+# %%
+# The density
+# -----------
 #
-# The density of each attractor is quasi-stationary: that of the states which have not left. `StationaryDensity` adds
-# them, each with the probability of its attractor, which follows from the rates. Both wells are equal, and so are the
-# probabilities. Below the barrier, ln p agrees with the formula to a small fraction of its range of 50.
+# The density of one attractor is quasi-stationary: it describes the states that have not
+# left. ``StationaryDensity`` adds the densities of both wells, weighted by the
+# probabilities of the wells, which follow from the rates and are equal by symmetry. The
+# largest difference of ln p from Boltzmann's density, over all states below the barrier,
+# is a small fraction of the range of ln p.
 
 stationary = vk.StationaryDensity.of(result)
 print(stationary)
@@ -47,118 +58,143 @@ print(stationary)
 x, v = np.meshgrid(stationary.x, stationary.v, indexing="ij")
 energy = v**2 / 2 - x**2 / 2 + x**4 / 4 + barrier
 area = (stationary.x[1] - stationary.x[0]) * (stationary.v[1] - stationary.v[0])
-below = energy < barrier
 misfits = []
-for intensity, log_density in zip(stationary.intensities, stationary.log_density, strict=True):
+densities = zip(stationary.intensities, stationary.log_density, strict=True)
+for intensity, log_density in densities:
     boltzmann = -4 * zeta * energy / intensity
     boltzmann -= math.log(np.exp(boltzmann).sum() * area)
-    misfits.append(np.abs(log_density - boltzmann)[below].max())
+    difference = np.abs(log_density - boltzmann)[energy < barrier]
+    misfits.append(float(difference.max()))
     depth = 4 * zeta * barrier / intensity
-    print(f"D = {intensity:g}: ln p is within {misfits[-1]:.2f} of the formula, down to {depth:.0f} below its maximum")
+    print(f"D = {intensity:g}: range of ln p {depth:.0f}, difference {misfits[-1]:.2f}")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 3. The rates
+# %%
+# The picture shows :math:`-D \ln p`, up to a constant. It has the shape of the energy E.
+
+fig, ax = plt.subplots(layout="constrained")
+stationary.plot(ax=ax)
+
+# %%
+# The rates
+# ---------
 #
-# Kramers' formula gives the rate out of a well in the limit of weak noise, at moderate and strong damping. Its
-# prefactor depends on the damping and on the curvatures of the well, 2, and of the barrier, 1. At these intensities the
-# formula is correct within 2 %. `ExitRate` has the rate with its error estimate, and the mean exit time.
+# Kramers' formula gives the rate out of the well for weak noise and moderate or strong
+# damping. Its prefactor contains the curvatures of the potential, 2 at the bottom and −1 at
+# the top:
+#
+# .. math::
+#
+#    k = \frac{\sqrt 2}{2\pi}\left(\sqrt{\zeta^2 + 1} - \zeta\right) e^{-\zeta/D}.
+#
+# At these intensities the formula has an error of about 2 %.
 
 prefactor = (math.sqrt(zeta**2 + 1) - zeta) * math.sqrt(2) / (2 * math.pi)
 left_rates = [rate for rate in result.rates if rate.source == 0]
-kramers = [prefactor * math.exp(-4 * zeta * barrier / rate.intensity) for rate in left_rates]
+kramers = [prefactor * math.exp(-zeta / rate.intensity) for rate in left_rates]
 for rate, by_formula in zip(left_rates, kramers, strict=True):
-    print(
-        f"D = {rate.intensity:g}: {rate.value:.4g} per second, from {rate.lower:.3g} to {rate.upper:.3g}; "
-        f"Kramers {by_formula:.4g}; mean time {rate.mean_time:.3g} s"
-    )
+    bounds = f"{rate.lower:.3g} to {rate.upper:.3g}"
+    print(f"D = {rate.intensity:g}: rate {rate.value:.4g} /s ({bounds})")
+    print(f"    Kramers' formula {by_formula:.4g} /s")
+    print(f"    mean exit time {rate.mean_time:.3g} s")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 4. The committor and the mean exit time
+# %%
+# The rate of one start
+# ---------------------
 #
-# A rate belongs to the attractor as a whole. For one start, `committor` is the probability to reach the core (a central
-# ellipse) of the other well before that of its own, and `mean_exit_time` the mean time until the exit. From the saddle
-# of this well both cores are equally likely by symmetry, so that the mean time is half that of the attractor.
+# A rate belongs to an attractor. For a single start, ``committor`` is the probability to
+# reach the core of the other well, a small ellipse around its attractor, before the core
+# of its own well. ``mean_exit_time`` is the mean time until the exit. From the saddle both
+# cores are equally probable by symmetry. The mean exit time from there is half that from
+# the attractor.
 
 place = {"x": saddle.points[0][0], "v": saddle.points[0][1]}
 at_saddle = result.committor("left-rest").interp(place).values
 times = result.mean_exit_time("left-rest").interp(place).values
 time_ratios = times * [rate.value for rate in left_rates]
-print("probability to reach the right well first, from the saddle:", at_saddle.round(4))
-print("mean exit time from the saddle, over that of the attractor:", time_ratios.round(4))
+print("from the saddle, at the three intensities")
+print("    probability of the right well", at_saddle.round(4), "exact 0.5")
+print("    mean time over that of the attractor", time_ratios.round(4), "exact 0.5")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 5. The limit of weak noise
+# %%
+# The limit of weak noise
+# -----------------------
 #
-# At one intensity, D ln τ differs from the activation energy by the prefactor, which is of the order of D. −D ln p at
-# the saddle differs by D ln 2 here, since half of the stationary density there belongs to the other well. From several
-# intensities `SGCM` extrapolates the limit D → 0 with an error estimate. The exact value is 4ζω_n times the barrier.
+# At one intensity, :math:`D\ln\tau` of the mean exit time :math:`\tau` differs from the
+# activation energy by the logarithm of the prefactor times D. ``SGCM`` extrapolates from
+# several intensities to D → 0, with an error estimate. The exact limit is
+# :math:`4\zeta\omega_n` times the barrier.
 
 exact = 4 * zeta * barrier
 limit = result.energy("left-rest", "right-rest")
-for rate, height in zip(left_rates, result.barrier("left-rest").values, strict=True):
-    print(f"D = {rate.intensity:g}: D ln τ = {-rate.intensity * rate.log_value:.4f}, −D ln p = {height:.4f}")
-print(f"limit D → 0: {limit.value:.4f}, between {limit.lower:.4f} and {limit.upper:.4f}; exact {exact:.4f}")
+for rate in left_rates:
+    print(f"D = {rate.intensity:g}: D ln τ = {-rate.intensity * rate.log_value:.4f}")
+print(f"D → 0: ΔU = {limit.value:.4f}, bounds {limit.lower:.4f} to {limit.upper:.4f}")
+print(f"exact: ΔU = {exact:.4f}")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 6. A density in time
+# %%
+# The logarithm of the mean exit time is nearly a straight line over 1/D. The slope between
+# neighbouring intensities tends to the activation energy.
+
+fig, ax = plt.subplots(layout="constrained")
+result.plot_rates(source="left-rest", ax=ax)
+
+fig, ax = plt.subplots(layout="constrained")
+result.plot_slopes(source="left-rest", limits=[limit], ax=ax)
+
+# %%
+# A density in time
+# -----------------
 #
-# `evolve_density` carries any density to later times. Here it starts as a uniform density, as in the paper, on the
-# scene with two stops. Noise of D = 10⁻⁴ is five times that of the scene; weaker noise has narrower densities, which
-# need more nodes and time. A finding reports what truncation on so few nodes would have changed in the probability. The
-# comparison is with 20 000 simulated trajectories: their distribution function differs from the exact one by less than
-# 0.013 with probability 99.8 %.
+# ``evolve_density`` carries any density to later times. Here it is uniform on a square at
+# first, and the scene is that with two stops at D = 10⁻⁴. The status reports the
+# probability that truncation has removed.
 
 osc = vk.load_scene("hertz-0.570").replace({"noise.intensity": 1e-4})
 box = np.array([[-0.4, 0.4], [-0.4, 0.4]])
+region = ((-0.75, 0.75), (-0.9, 0.9))
 intervals = (1, 4, 10)
-history = vk.evolve_density(osc, ((-0.75, 0.75), (-0.9, 0.9)), intervals, start=box, nodes=(200, 200))
+history = vk.evolve_density(osc, region, intervals, start=box, nodes=(200, 200))
 print(history.status)
 
+# %%
+# The comparison is with 20 000 simulated trajectories. The empirical distribution function
+# of so many samples differs from the exact one by less than 0.013 with a probability of
+# 99.8 % (Kolmogorov's limit law).
+
 starts = np.random.default_rng(5).uniform(*box.T, (20_000, 2))
-simulated = [np.sort(osc.section_map(starts, interval, rng=7)[:, 0]) for interval in intervals]
-marginals = history.marginal("x").values
+ends = [osc.section_map(starts, interval, rng=7) for interval in intervals]
+simulated = [np.sort(states[:, 0]) for states in ends]
+steps = np.diff(history.x)
 differences = []
-for marginal, sample in zip(marginals, simulated, strict=True):
-    steps = np.diff(history.x)
-    cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (marginal[1:] + marginal[:-1]) * steps)])
+for marginal, sample in zip(history.marginal("x").values, simulated, strict=True):
+    pieces = 0.5 * (marginal[1:] + marginal[:-1]) * steps
+    cumulative = np.concatenate([[0.0], np.cumsum(pieces)])
     counted = np.searchsorted(sample, history.x) / len(sample)
     differences.append(np.abs(cumulative / cumulative[-1] - counted).max())
-for time, difference in zip(history.times, differences, strict=True):
-    print(f"t = {time:5.1f} s: distribution functions of x differ by up to {difference:.4f}")
+for interval, difference in zip(intervals, differences, strict=True):
+    print(f"t = {interval:2d} T: largest difference {difference:.4f}")
 
-# ---------------------------------------------------------------------------------------------------------------------
-# 7. Pictures
+# %%
+# The lines are the marginal densities of x, the dots histograms of the trajectories.
+
+fig, ax = plt.subplots(layout="constrained")
+artists = history.plot(ax=ax)
+for line, sample in zip(artists.lines, simulated, strict=True):
+    shares, edges = np.histogram(sample, 100, density=True)
+    centres = (edges[1:] + edges[:-1]) / 2
+    ax.plot(centres, shares, ".", markersize=4, color=line.get_color())
+ax.set_xlim(-0.4, 0.8)
+
+# %%
+# What you saw
+# ------------
 #
-# The stationary quasi-potential −D ln p has the shape of the energy. The logarithm of the mean exit time is nearly a
-# straight line over 1/D; its local slope tends to the activation energy. The dots on the marginal densities of x are
-# histograms of the simulated trajectories.
+# * The density of the double well agrees with Boltzmann's down to e⁻⁵⁰ of its maximum, and
+#   its rates with Kramers' formula.
+# * Extrapolated to D → 0, the rates give the activation energy without any path.
+# * A density in time agrees with simulated trajectories.
+#
+# :doc:`/how-to/density` has the settings. The next tutorial, :doc:`06_exit_times`,
+# simulates the exits.
 
-
-def draw_transients():
-    """Draw the marginal densities of x and histograms of the simulated trajectories."""
-    artists = history.plot()
-    for line, sample in zip(artists.lines, simulated, strict=True):
-        shares, edges = np.histogram(sample, 100, density=True)
-        artists.ax.plot((edges[1:] + edges[:-1]) / 2, shares, ".", markersize=4, color=line.get_color())
-    artists.ax.set_xlim(-0.4, 0.8)
-    return artists
-
-
-PICTURES = {
-    "05-quasi-potential.png": stationary.plot,
-    "05-exit-times.png": lambda: result.plot_rates(source="left-rest"),
-    "05-slopes.png": lambda: result.plot_slopes(source="left-rest", limits=[limit]),
-    "05-transients.png": draw_transients,
-}
-
-
-def save_pictures(folder):
-    """Save the pictures in a folder and print where they are."""
-    folder.mkdir(exist_ok=True)
-    for name, draw in PICTURES.items():
-        draw().figure.savefig(folder / name, dpi=150)
-        print("picture:", folder / name)
-
-
-if __name__ == "__main__":
-    save_pictures(Path.cwd() / "tutorial-pictures")
+plt.show()
