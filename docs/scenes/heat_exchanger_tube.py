@@ -3,8 +3,8 @@ A tube in its support
 =====================
 
 A heat-exchanger tube of 0.35 kg vibrates in a support with a clearance of 0.25 mm on either side. The flow drives it
-with 6 N at 65 Hz and with random forces. In its quiet state the tube does not touch the support. How long does it stay
-quiet? All numbers are given with their units.
+with 6 N at 65 Hz and with random forces. In its quiet state the tube does not touch the support. The page computes the
+mean time in this state. All numbers are given with their units.
 """
 
 import math

@@ -29,8 +29,8 @@ print(structure)
 
 # %%
 # Weak noise drives the mass out of the clear-running state. Along the most probable exit path the force of the noise
-# is the momentum :math:`p_2`: it pushes in step with the motion and grows from period to period. The action is the
-# integral of :math:`\tfrac12 p_2^2`.
+# is the momentum :math:`p_2`. It oscillates at the natural frequency and grows over some thirty periods, until the
+# path approaches the saddle on the basin boundary. The action is the integral of :math:`\tfrac12 p_2^2`.
 
 search = vk.LeastAction(source="clear", shooting=None, graph=vk.GraphSearch(nodes=(160, 160)))
 result = search.run(osc, structure)
