@@ -24,7 +24,7 @@ osc = vk.Oscillator(
     excitations=(vk.Harmonic(amplitude="6 N", frequency="65 Hz"),),
     noise=vk.WhiteNoise("9.8e-5 N^2/Hz"),
 )
-structure = vk.find_structure(osc, cells=(40, 40), starts=(12, 12), manifolds=False)
+structure = vk.find_structure(osc, cells=(40, 40), starts=(12, 12), saddles=False)
 clear = structure.attractors[0]
 print(structure)
 

@@ -12,7 +12,6 @@ Fokker–Planck Equation*, chapter 11).
 import math
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import vibrokit as vk
 

@@ -9,7 +9,7 @@ import pytest
 
 SCENES = Path(__file__).parents[2] / "docs/scenes"
 SCRIPTS = sorted(SCENES.glob("*.py"))
-QUICK = ("triple_well", "ueda")  # seconds, compilation included
+QUICK = ("bouncing_ball", "ueda")
 LIBRARIES = {"math", "matplotlib", "numpy", "vibrokit"}
 
 
