@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 from vibrokit.analyzers.paths.action_descent import descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
@@ -29,7 +29,7 @@ def descended(start, end, intervals, pieces):
     ("start", "end", "intervals"),
     [
         ((0.0, 0.55), (0.2, 0.3), 2), ((0.2, 0.5), (0.3, -0.3), 2),
-        ((0.0, 0.55), (0.3, -0.3), 3), slow((0.2, 0.5), (0.0, 0.6), 3),
+        ((0.0, 0.55), (0.3, -0.3), 3), long((0.2, 0.5), (0.0, 0.6), 3),
     ],
 )  # fmt: skip
 def test_impacts_move_from_one_piece_to_another(start, end, intervals):

@@ -22,7 +22,7 @@ from vibrokit.results.energy import Bound
 pytestmark = pytest.mark.slow
 
 BARRIER = 0.25  # of −x²/2 + x⁴/4
-WELLS = [0.01, 0.1, long(0.5), 2.0]  # their damping
+WELLS = [long(0.01), 0.1, long(0.5), long(2.0)]  # their damping
 SMALL = vk.ActionGraph(nodes=(64, 64))
 
 
@@ -57,6 +57,7 @@ def solutions(search, problem):
         yield costs.solution()
 
 
+@pytest.mark.long
 def test_each_solution_has_twice_the_nodes_and_comes_closer():
     found = list(solutions(GraphSearch(nodes=(280, 260)), problem(*well(0.1))))
     assert [each.potential.grids.shape for each in found] == [(70, 65), (140, 130), (280, 260)]
@@ -101,6 +102,7 @@ def test_the_error_estimate_holds_as_nodes_and_steps_refine(damping, nodes, step
     assert abs(energy.value - 4 * damping * BARRIER) <= energy.numerical_error
 
 
+@pytest.mark.long
 def test_the_error_estimate_shrinks_with_nodes_and_steps():
     errors = [best(solved(0.3, 10 * steps, steps), 1).numerical_error for steps in (8, 16, 32)]
     assert errors[2] < 0.5 * errors[1] < 0.25 * errors[0]
@@ -127,7 +129,7 @@ def test_candidates_lead_from_the_attractor_over_the_exit_and_polish_to_the_barr
 # --- linear scene: Ψ = ½ δqᵀ Σ⁻¹ δq = 2ζω_n (ω_n² δx² + δv²), first touch 2ζω_n³ (b − max x_s)²
 
 STOP, AMPLITUDE, FREQUENCY = 1.0, 0.3, 0.57
-SCENES = [(0.05, 1.0), long(0.5, 1.0), (2.0, 1.0), (0.05, 1.7)]
+SCENES = [(0.05, 1.0), long(0.5, 1.0), long(2.0, 1.0), (0.05, 1.7)]
 
 
 @functools.cache
@@ -396,6 +398,7 @@ def barrier_between(bottom, top):
     return potential(top) - potential(bottom)
 
 
+@pytest.mark.long
 def test_a_cheap_exit_is_solved_as_well_as_a_costly_one():
     osc, structure = three_wells()
     left, middle, right = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
@@ -409,6 +412,7 @@ def test_a_cheap_exit_is_solved_as_well_as_a_costly_one():
     assert [energy.target for energy in last.energies] == [right.label, left.label]  # the cheapest first
 
 
+@pytest.mark.long
 def test_a_saddle_at_the_tip_of_a_basin_is_reached():
     """Escape of a softening oscillator, over a saddle where its basin is thinner than a cell.
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 from vibrokit.analyzers.agreement import compared
 from vibrokit.analyzers.paths.detailed_balance import least_actions, with_paths
 from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
@@ -85,7 +85,7 @@ def test_closed_forms(osc, source, exit_, climbs):
     assert found == {target: pytest.approx(4 * ZETA * climb, rel=1e-9) for target, climb in climbs.items()}
 
 
-@pytest.mark.parametrize("stiffness", [20.0, 1e6, slow(1e12)])
+@pytest.mark.parametrize("stiffness", [20.0, 1e6, long(1e12)])
 def test_wells_that_end_in_stiff_stops(stiffness):
     """Pressed against a stop at 0.9 by the force x − x³; the depth d solves k d^1.5 = x − x³ there."""
     _, found = least(stopped(vk.Hertz(stiffness)))
@@ -112,7 +112,7 @@ def test_least_action_needs_no_other_search():
         assert math.isclose(energy.lower, energy.value, rel_tol=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_path_that_cannot_be_polished():
     """A stop of 1e7: reversed relaxation from the saddle has too many impacts to be polished, and is the path."""
     osc = stopped(vk.Hertz(1e7))

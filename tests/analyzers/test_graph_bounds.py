@@ -80,6 +80,7 @@ def test_another_pair_of_cycles():
         assert energy.lower <= right <= 1.01 * energy.upper
 
 
+@pytest.mark.long
 def test_a_search_that_is_stopped_has_an_interval_that_contains_the_energy():
     analyzer = vk.LeastAction(source="large-cycle", shooting=None, graph=GraphSearch(nodes=(60, 60)))
     osc, structure = birhythmic(0.1)

@@ -113,7 +113,7 @@ def minimized(osc, path, count=1200):
     return scipy.optimize.least_squares(noise, x[2:-2].copy(), jac_sparsity=pattern, tr_solver="lsmr").cost
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_passing_a_saddle_may_cost_less_than_passing_the_attractor():
     """Weakly damped motion that runs down from the first saddle is pushed over the second on its way."""
     problem = problem_of(UNDERDAMPED)

@@ -144,7 +144,7 @@ def test_an_incomplete_result_is_no_stop(calls, tmp_path, number):
     assert which(ran) == [[PATHS, *BOTH][number - 1]]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("number", [1, long(4)])
 def test_a_finer_assessment_that_was_stopped_keeps_the_coarser_one(calls, tmp_path, number):
     ran, stop = calls

@@ -57,7 +57,7 @@ def consistent(answer, value, error):
 
 @pytest.mark.parametrize("runs", RUNS)
 @pytest.mark.parametrize(
-    ("scene", "intensity"), [(WELL, 0.09), (WELL, 0.08), (WELL, 0.07), (STOP, 0.009), (STOP, 0.007)]
+    ("scene", "intensity"), [(WELL, 0.09), (WELL, 0.08), (WELL, 0.07), long(STOP, 0.009), long(STOP, 0.007)]
 )
 def test_mean_times_and_probabilities_of_leaving(scene, intensity, runs):
     found, times = assessed(scene), scene.exits(0, intensity, runs, 700)
@@ -86,6 +86,7 @@ def test_shares_of_time(intensity, runs):
         assert float(one["upper"] - one["lower"]) < 0.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("runs", RUNS)
 def test_intervals_hold_the_truth_as_often_as_they_claim(runs):
     """Forty estimates from 25 exits each: 95 % intervals hold the mean time, and the shares that follow."""

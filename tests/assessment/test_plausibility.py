@@ -166,7 +166,7 @@ def test_bundled_scenes_are_not_odd():
     }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_right_scenes_of_other_people_are_rarely_odd():
     """Of the 91, three are nearly overdamped, one is pressed on its stop, and one microscope's tip touches softly."""
     cases = tomllib.loads(PUBLIC.read_text())["cases"]

@@ -156,6 +156,7 @@ def test_no_graph_grows_from_a_centre(centres):
     refused(StructureError, lambda: SMALL_GRAPH.search(problem_of(*centres)), "multiplier")
 
 
+@pytest.mark.long
 def test_least_action_names_each_method_that_fails(centres):
     result = vk.LeastAction(source=0, **SMALL).run(*centres)
     assert result.energies == ()

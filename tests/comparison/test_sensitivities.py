@@ -75,7 +75,7 @@ def scaled(osc, names, factor):
     return osc.replace({name: factor * osc.parameters[name] for name in names})
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_both_gaps_of_the_paper():
     """The stops moved by 0.1 % to either side, and the energies solved for anew: at 1 % the power is 0.6 % off."""
     osc = vk.load_scene("hertz-0.570")

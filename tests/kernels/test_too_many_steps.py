@@ -14,7 +14,7 @@ def frictional(formula, **numbers):
     return vk.Oscillator(natural_frequency=1.0, damping_ratio=0.05, spring=vk.CustomSpring(formula, **numbers))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     "formula",
     ["x + f*atan(v/w)", *map(long, ("x + f*min(max(v/w, -1), 1)", "x + f*tanh(v/w)", "x + f*v/sqrt(v**2 + w**2)"))],

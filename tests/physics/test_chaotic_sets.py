@@ -11,7 +11,7 @@ from tests.scenes import double_well
 from vibrokit.results.codes import Code
 from vibrokit.results.energy import Bound
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 DAMPING, FORCE, FREQUENCY = 0.15, 0.3, 1.2
 

@@ -66,6 +66,7 @@ def simulated_first_passage(damping, amplitude, frequency, stop, intensity, path
             return math.log(present / lost), 1 / math.sqrt(lost)
 
 
+@pytest.mark.long
 def test_first_contact_of_a_forced_linear_scene_is_that_of_an_exact_simulation():
     given = {"damping": 0.2, "amplitude": 0.1, "frequency": 0.8, "stop": 0.5, "intensity": 1e-2}
     osc = scene(
@@ -83,6 +84,7 @@ def test_first_contact_of_a_forced_linear_scene_is_that_of_an_exact_simulation()
     assert not result.found(vk.Code.RATE_UNCERTAIN)
 
 
+@pytest.mark.long
 def test_the_first_state_in_another_basin_is_that_of_simulated_trajectories():
     osc = double_well(noise=vk.WhiteNoise(intensity=2e-2))
     structure = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)

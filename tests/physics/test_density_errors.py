@@ -59,7 +59,7 @@ def test_a_small_state_beside_a_wide_one_is_left_as_in_simulations(length, side)
         assert rate.log_error < 0.6
 
 
-@pytest.mark.parametrize(("damping", "depth"), [(0.1, 20), (0.5, 30)])
+@pytest.mark.parametrize(("damping", "depth"), [(0.1, 20), long(0.5, 30)])
 def test_rates_are_exact_wherever_states_are_committed(damping, depth, monkeypatch):
     """Also nearer to the basin's edge, farther from it, and in the core only: the exact rate is in the stated error."""
     osc = double_well(damping_ratio=damping, noise=vk.WhiteNoise(damping))
@@ -110,12 +110,13 @@ class Beyond(vk.LeaveRegion):
         return np.array([[-np.inf, self.place], [-np.inf, np.inf]])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("capacity", "current"),
     [
         (1.25, 0.7),
-        long(0.5, 0.9),
-        long(1.25, 0.9),
+        (0.5, 0.9),
+        (1.25, 0.9),
     ],
 )
 def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
@@ -144,7 +145,8 @@ def test_escape_of_a_tilted_washboard_is_that_of_kramers(capacity, current):
     assert energy.value == pytest.approx(barrier, rel=0.01)
 
 
-@pytest.mark.parametrize("damping", [0.2, long(1.0)])
+@pytest.mark.long
+@pytest.mark.parametrize("damping", [0.2, 1.0])
 def test_rates_of_states_that_do_not_last_are_those_of_simulations_all_the_same(damping):
     """Wells as deep as ΔU/D = 1 and 2, core to core: what counts as an exit decides the rate, and is no error of it."""
     osc = double_well(damping_ratio=damping, noise=vk.WhiteNoise(damping))

@@ -71,10 +71,10 @@ def test_escape_from_the_only_well_is_that_of_kramers(sign):
         assert agree(found, right, formula=1 / 6)  # the next order of the formula is that of D/ΔU
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("damping_ratio", "ratio"),
-    [(0.02, 6.0), long(0.5, 8.0), long(2.0, 6.0)],
+    [(0.02, 6.0), (0.5, 8.0), (2.0, 6.0)],
 )
 def test_escape_at_weak_and_strong_damping(damping_ratio, ratio):
     osc = softening(damping_ratio, ratio)
@@ -83,7 +83,7 @@ def test_escape_at_weak_and_strong_damping(damping_ratio, ratio):
         assert agree(total(analyzer, osc), right, formula=1 / ratio)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_barriers_are_left_twice_as_often():
     """x²/2 − x⁴/4: from one barrier to the other the action is √8/3."""
     osc = vk.Oscillator(
@@ -133,8 +133,8 @@ def test_escape_under_a_periodic_force():
         assert agree(total(analyzer, osc, structure), right, formula=3 * 1800**-0.5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("for_good", [True, long(False)])
+@pytest.mark.long
+@pytest.mark.parametrize("for_good", [True, False])
 def test_two_wells_of_which_one_is_also_left_by_escape(for_good):
     """Wells at 0 and 2, barriers at 1 and 3; density and simulation agree about both ways out of the second."""
     spring = vk.CustomSpring("-x*(x - 1)*(x - 2)*(x - 3)/6")

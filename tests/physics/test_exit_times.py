@@ -56,6 +56,7 @@ def test_rates_by_splitting_are_exact(scene_and_structure):
     assert abs(rate.log_value - double_well_rate(osc.damping_ratio, rate.intensity)) <= 3 * rate.log_error
 
 
+@pytest.mark.long
 def test_direct_and_splitting_agree(scene_and_structure):
     osc, structure = scene_and_structure
     one, other = (rate_at(osc, structure, 7.0, splitting=way, target_error=0.05) for way in (False, True))
@@ -98,6 +99,7 @@ def test_intervals_of_splitting_cover_the_truth():
 SIMULATED = {1e-4: (3.638, 0.004), 5e-5: (4.304, 0.004), 2e-5: (6.492, 0.007), 1e-5: (10.70, 0.05)}
 
 
+@pytest.mark.long
 def test_times_of_the_paper_s_scene_are_those_of_simulated_trajectories():
     osc = vk.load_scene("hertz-0.570")
     structure = vk.find_structure(osc, cells=(100, 100), rng=0)

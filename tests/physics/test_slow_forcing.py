@@ -11,7 +11,6 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import spsolve
 
 import vibrokit as vk
-from tests.layers import long
 from tests.scenes import double_well
 from vibrokit.analyzers.paths import slow_relaxation
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
@@ -153,8 +152,8 @@ def minimized(frequency, path, step):
     raise AssertionError("no minimum")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("frequency", [0.1, *(long(each) for each in (0.3, 0.05))])
+@pytest.mark.long
+@pytest.mark.parametrize("frequency", [0.3, 0.1, 0.05])
 def test_minimized_directly_it_is_the_same(frequency):
     energy = energies(frequency)[0]
     coarse, fine = (minimized(frequency, energy.path, step) for step in (0.02, 0.01))

@@ -61,7 +61,7 @@ def driven():
     return vk.find_structure(pendulum(vk.Constant(0.5)), region=region, cells=(100, 100), manifolds=False)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_driven_pendulum_rests_or_runs(driven):
     running, rest = driven.attractors
     assert (running.name, running.turns, rest.name, rest.turns) == ("running", 1, "rest", 0)
@@ -74,7 +74,7 @@ def test_a_driven_pendulum_rests_or_runs(driven):
     assert set(saddle.leads_to) == {0, 1}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_running_state_balances_damping_and_drive(driven):
     """In one turn the drive does the work 2π·0.5, which damping 0.1 takes: 0.1 ∫ v dx."""
     x, v = driven.attractor("running").orbit.T
@@ -82,7 +82,7 @@ def test_a_running_state_balances_damping_and_drive(driven):
     assert np.trapezoid(v, x) == pytest.approx(2 * math.pi * 0.5 / 0.1, rel=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_leaves_a_running_state_is_refused(driven):
     noisy = pendulum(vk.Constant(0.5)).replace(noise=vk.WhiteNoise(0.01))
     result = vk.ActionGraph(source="running", nodes=(32, 32)).run(noisy, driven)

@@ -124,7 +124,7 @@ def test_an_attractor_outside_the_region_is_said():
     assert not wide.found(Code.REGION_TOO_SMALL)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("law", "frequency"),
     [(vk.Linear(1e6), 0.8), (vk.Linear(1e6), 1.1), long(vk.Hertz(1e8), 0.9)],

@@ -49,7 +49,7 @@ def test_a_region_contains_the_tops_of_a_softening_spring(cubic):
     assert not structure.found(Code.TOPS_OUTSIDE)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_well_with_one_top_and_a_well_beyond_a_top():
     one_sided = found_in(shaken(polynomial(a=1.0, b=-1.0)))
     assert one_sided.region.x[0] < 0 < 1 < one_sided.region.x[1]

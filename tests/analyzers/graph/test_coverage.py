@@ -35,7 +35,7 @@ def problem(which):
     return ExitProblem(osc, structure, structure.attractors[0], vk.LeaveBasin())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("which", ["cuts the basin", long("leaves the saddle out")])
 def test_grids_reach_beyond_the_region_where_a_known_path_does(which):
     states = np.array([[-0.5, 0.0], [1.0, 0.0]])
