@@ -37,7 +37,7 @@ _SCENE = _argument("scene", help="a bundled scene, such as hertz-0.570, or a TOM
 _SOURCE = _argument("--source", metavar="STATE", help="name or label of the state to leave (default: each)")
 _EXIT = _argument(
     "--exit", metavar="NAME[:ARGUMENT]",
-    help="what counts as leaving: leave-basin (default), first-contact[:SIDE], or the exit of a plug-in",
+    help="the exit: leave-basin (default), first-contact[:SIDE], or that of a plug-in",
 )  # fmt: skip
 _SEED = _argument("--seed", type=int, default=0, help="seed of what is random (default 0)")
 _TIME_LIMIT = _argument("--time-limit", type=float, metavar="SECONDS", help="stop after this time")
@@ -46,23 +46,25 @@ _JSON = _argument("--json", action="store_true", help="print one JSON object and
 COMMANDS = (
     Command(
         "assess", "work:assess_scene",
-        "answer how long each state lasts, by all methods, and whether they agree",
+        "compute how long each state lasts, by all methods, and test whether they agree",
         (
             _SCENE,
             _argument("--accuracy", type=float, default=0.1, help="relative error that is wanted (default 0.1)"),
-            _argument("--mean-time", metavar="TIME", help='how much noise a state bears that has to last "1yr"'),
-            _argument("--within", metavar="TIME", help='how likely a state is left within "8h"'),
+            _argument("--mean-time", metavar="TIME",
+                      help="also the largest noise intensity at which a state lasts this long, such as 1yr"),
+            _argument("--within", metavar="TIME",
+                      help="also the probability that a state is left within this time, such as 8h"),
             _SOURCE, _EXIT,
             _argument("--method", action="append", metavar="NAME", help="an analyzer to run (default: all three)"),
             _argument("--time-limit", type=float, metavar="SECONDS",
                       help="stop after this time (default 300; 0 for no limit)"),
             _file("a result to take over", "--known", action="append", default=[]),
             _SEED, _JSON,
-            _file("save the assessment after each stage (netCDF); if the file exists, go on from it"),
+            _file("save the assessment after each stage (netCDF); if the file exists, continue from it"),
             _file("where to save the figure (default: none)", "--figure"),
         ),
-        "Find the steady states of a scene, and answer how long noise leaves the mass in each of them, by three "
-        "methods. With -o FILE, 'vibrokit report FILE -o page.html' makes a page of the answer.",
+        "Find the steady states of a scene, and compute by three methods how long the mass stays in each "
+        "of them. With -o FILE, 'vibrokit report FILE -o page.html' makes a page of the answer.",
         "Ctrl-C, SIGTERM and the time limit stop the work; the answers that were reached are printed and kept.",
     ),
     Command(
@@ -100,7 +102,7 @@ COMMANDS = (
                       help="rk4:STEPS, rk8:STEPS, order8:TOLERANCE or free-flight:TOLERANCE"),
             _argument("--cells", type=int, default=200, help="cells of the basin grid in x and in v (default 200)"),
             _SEED, _TIME_LIMIT,
-            _file("keep what mfet has done in this file, and go on from it", "--checkpoint"),
+            _file("keep what mfet has done in this file, and continue from it", "--checkpoint"),
             _argument("--verbose", action="store_true",
                       help="print saddles, all paths, sensitivities and all remarks"),
             _JSON,
@@ -108,32 +110,32 @@ COMMANDS = (
                   "the structure too, as FILE-structure, or as FILE if there is no result"),
             _file("where to save the figure (default: SCENE-NAME.png)", "--figure"),
         ),
-        "Find the steady states of a scene and what its analyzers compute: activation energies, rates, densities. "
+        "Find the steady states of a scene, and compute activation energies, rates or densities. "
         "'vibrokit assess' makes one answer of them.",
-        "Each result is printed and saved when it is found. Ctrl-C, SIGTERM and the time limit stop the work; what was "
-        "found is kept, marked incomplete.",
+        "Each result is printed and saved when it is found. Ctrl-C, SIGTERM and the time limit stop the work; results "
+        "so far are kept, marked incomplete.",
     ),
     Command(
         "reconcile", "saved:reconcile_files", "compare saved results of one scene, exit by exit",
         (
-            _file("what run or save wrote, two files at least", "file", nargs="+", metavar="file"),
+            _file("result files, two at least", "file", nargs="+", metavar="file"),
             _argument("--level", type=float, default=0.01,
                       help="probability of a false alarm in each verdict (default 0.01)"),
             _argument("--json", action="store_true", help="print one JSON object"),
             _file("save the reconciliation (netCDF)"),
         ),
-        "Say whether the methods of saved results agree, exit by exit, within their errors.",
+        "Test whether the methods of saved results agree, exit by exit, within their errors.",
         "The exit status is 1 if two results disagree, or one is incomplete.",
     ),
     Command(
-        "report", "report:report_files", "print what saved results of one scene say, or write a page to hand on",
+        "report", "report:report_files", "print saved results of one scene, or write a page to hand on",
         (
-            _file("what assess, run, reconcile or save wrote", "file", nargs="+", metavar="file"),
+            _file("result files", "file", nargs="+", metavar="file"),
             _file("write the page", metavar="FILE.html"),
             _file("write each table as comma-separated values", "--tables", metavar="FOLDER"),
             _argument("--title", help="title of the page (default: the name of the first file)"),
         ),
-        "Print what saved results of one scene say; with -o, write a page that begins with the answer in plain words "
+        "Print saved results of one scene; with -o, write a page that begins with the answer in plain words "
         "and ends with all settings. A file that exists is replaced.",
         "The page needs nothing else: no script, no file, no network. The exit status is 1 if a result is incomplete.",
     ),
@@ -183,7 +185,7 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line; its options have the `function` of the command."""
     whole = argparse.ArgumentParser(
         prog="vibrokit",
-        description="Stochastic stability of vibro-impact oscillators: how hard each state is to leave.",
+        description="Stochastic stability of vibro-impact oscillators: how stable each state is.",
         epilog="Begin with 'vibrokit assess hertz-0.570 -o answer.nc' and 'vibrokit report answer.nc -o answer.html'; "
         "'vibrokit COMMAND --help' explains a command.",
     )

@@ -13,7 +13,7 @@ from typing import Any
 from vibrokit.progress import Work, working
 from vibrokit.results.atomic import checked_picture, checked_target
 
-_NOTICE = b"\nvibrokit: stopping; what was found is kept. Press Ctrl-C again to stop at once.\n"
+_NOTICE = b"\nvibrokit: stopping; the results so far are kept. Press Ctrl-C again to stop at once.\n"
 _STANDARD_ERROR = 2  # its descriptor: Python's own stream may be in use when a signal arrives
 
 

@@ -30,7 +30,7 @@ class Severity(StrEnum):
 
 
 INFO, WARNING, ERROR = Severity
-_SEE_REASON = "The reason says what to change."
+_SEE_REASON = "Change the setting that the reason names."
 _RAISE_BUDGET = "Raise budget, an argument of find_structure."
 _FINER_STEPPER = "Use a finer stepper."
 
@@ -55,7 +55,7 @@ class Code(StrEnum):
     # Any analysis
     REMARK = "remark", INFO, "{text}", "Read it: a plug-in wrote it."
     STOPPED = (
-        "stopped", ERROR, "The work was stopped during {stage} ({reason}); what was found before is kept.",
+        "stopped", ERROR, "The work was stopped during {stage} ({reason}); earlier results are kept.",
         "Run it again with more time.",
     )  # fmt: skip
     UNKNOWN_KIND = (
@@ -93,8 +93,8 @@ class Code(StrEnum):
     STARTS_ENDED = "starts-ended", INFO, "{count} of {starts} starts ended where the forces do ({where}), or diverged."
     STARTS_NEUTRAL = (
         "starts-neutral", WARNING,
-        "{count} of {starts:start} settled at places that no force determines, on motions of a family, which attract "
-        "none beside them and are no attractors.",
+        "{count} of {starts:start} settled on one of a family of equal motions. No force leads back to one of them, so "
+        "that none is an attractor.",
         "Give the scene a spring, or a force that presses the mass to a stop.",
     )  # fmt: skip
     STARTS_STALLED = (
@@ -128,7 +128,7 @@ class Code(StrEnum):
         "region-too-small", WARNING,
         "Steady states outside the region: {count}; {x_min:.6g} to {x_max:.6g} m and {v_min:.6g} to {v_max:.6g} m/s "
         "contain all that are known.",
-        "Give that region, or none.",
+        "Give that region, or none, so that the default is widened.",
     )  # fmt: skip
     TOPS_OUTSIDE = (
         "tops-outside", INFO,
@@ -199,7 +199,7 @@ class Code(StrEnum):
     )  # fmt: skip
     LARGE_RESIDUAL = (
         "large-residual", WARNING,
-        "The largest residual of an unstable orbit, less what its multipliers enlarge it by, is {residual:.1e}, above "
+        "The largest residual of an unstable orbit, divided by the growth by its multipliers, is {residual:.1e}, above "
         "{accepted:g}.",
         _FINER_STEPPER,
     )  # fmt: skip
@@ -352,7 +352,7 @@ class Code(StrEnum):
 
     # Reconciliation
     USED_INCOMPLETE = (
-        "used-incomplete", INFO, "The result of {method} is incomplete; it was used as far as it goes.",
+        "used-incomplete", INFO, "The result of {method} is incomplete; its available part was used.",
         "Run the analyzer to its end.",
     )  # fmt: skip
 
