@@ -29,7 +29,7 @@ osc = vk.Oscillator(
     ),
     excitations=(vk.Harmonic(amplitude=1.333e-9 / mass, frequency=1.0005 * natural),),
 )
-structure = vk.find_structure(osc, cells=(20, 20), saddles=False)
+structure = vk.find_structure(osc, cells=(20, 20), starts=(8, 8), saddles=False)
 print(structure)
 
 # %%
