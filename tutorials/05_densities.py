@@ -40,7 +40,7 @@ wells = vk.find_structure(well, cells=(60, 60), rng=0)
 (saddle,) = wells.saddles
 search = vk.SGCM(intensities=(0.01, 0.006, 0.004), nodes=(120, 120))
 result = search.run(well, wells)
-print(result.status)
+print("findings:", result.status or "none")
 
 # %%
 # The density
@@ -146,15 +146,16 @@ result.plot_slopes(source="left-rest", limits=[limit], ax=ax)
 # -----------------
 #
 # ``evolve_density`` carries any density to later times. Here it is uniform on a square at
-# first, and the scene is that with two stops at D = 10⁻⁴. The status reports the
-# probability that truncation has removed.
+# first, and the scene is that with two stops at D = 10⁻⁴. ``mass`` is the probability in
+# the region; it stays 1 if the region is large enough.
 
 osc = vk.load_scene("hertz-0.570").replace({"noise.intensity": 1e-4})
 box = np.array([[-0.4, 0.4], [-0.4, 0.4]])
 region = ((-0.75, 0.75), (-0.9, 0.9))
 intervals = (1, 4, 10)
 history = vk.evolve_density(osc, region, intervals, start=box, nodes=(200, 200))
-print(history.status)
+print("findings:", history.status or "none")
+print("probability in the region:", history.mass.round(6))
 
 # %%
 # The comparison is with 20 000 simulated trajectories. The empirical distribution function
