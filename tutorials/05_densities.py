@@ -153,7 +153,7 @@ osc = vk.load_scene("hertz-0.570").replace({"noise.intensity": 1e-4})
 box = np.array([[-0.4, 0.4], [-0.4, 0.4]])
 region = ((-0.75, 0.75), (-0.9, 0.9))
 intervals = (1, 4, 10)
-history = vk.evolve_density(osc, region, intervals, start=box, nodes=(200, 200))
+history = vk.evolve_density(osc, region, intervals, start=box, nodes=(300, 300))
 print("findings:", history.status or "none")
 print("probability in the region:", history.mass.round(6))
 

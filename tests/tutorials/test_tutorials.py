@@ -350,7 +350,7 @@ def test_limit_of_weak_noise_is_the_barrier(densities):
 
 def test_transients_are_those_of_simulated_trajectories(densities):
     assert densities.history.mass == pytest.approx(1.0, abs=1e-3)
-    assert max(densities.differences) < 0.02
+    assert max(densities.differences) < 0.013  # 1.86 over the root of 20 000: exceeded by chance once in 500
 
 
 def test_pictures_of_the_densities(densities):
