@@ -1,6 +1,6 @@
 """Certified energies of the gallery against SciPy's DOP853, which carries each path from section to section once more.
 
-    python -m tests.benchmarks.action_carried [WORDS …] [--limit 120]
+    python -m tests.benchmarks.action_carried [WORDS …] [--limit 120] [--csv FILE]
 
 Hamilton's equations are written out here: x″ = f + p₂, p₁′ = −p₂ ∂f/∂x, p₂′ = −p₁ − p₂ ∂f/∂v, with the action
 ∫ ½ p₂² dt. Contacts are located as events. A row is one path: the largest misfit at a section, in units of the path's
@@ -17,6 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.action_minimized import model_of
 from tests.benchmarks.gallery import SCENES
 
@@ -105,7 +106,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
     parser.add_argument("--limit", type=float, default=120.0)
+    table_file.add_option(parser)
     given = parser.parse_args()
+    rows = []
     for name, osc in SCENES.items():
         if not all(word in name for word in given.words):
             continue
@@ -128,6 +131,12 @@ def main():
                     f"astray {start:.0e} and {end:.0e}, action {difference:+.1e}",
                     flush=True,
                 )
+                rows.append({
+                    "scene": name, "exit": result.exit_of(energy), "energy": f"{energy.value:.12g}",
+                    "misfit": f"{misfit:.1e}", "start": f"{start:.1e}", "end": f"{end:.1e}",
+                    "difference": f"{difference:.1e}",
+                })  # fmt: skip
+                table_file.write(given.csv, rows, timed=False)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Certified energies of the gallery against direct minimization of ∫ ½ u² dt, by a program that shares no code.
 
-    python -m tests.benchmarks.action_minimized [WORDS …] [--limit 120]
+    python -m tests.benchmarks.action_minimized [WORDS …] [--limit 120] [--csv FILE]
 
 Each polished path is the first guess of a minimization on a grid of its own (`tests.physics.reference_action`), with
 both orbits found anew. The window is longer by as many periods as distances from the orbits need to decay by `LEFT`,
@@ -15,6 +15,7 @@ import time
 import numpy as np
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.gallery import SCENES
 from tests.physics import reference_action as reference
 from tests.physics.reference_guesses import sampled
@@ -91,7 +92,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
     parser.add_argument("--limit", type=float, default=120.0)
+    table_file.add_option(parser)
     given = parser.parse_args()
+    rows = []
     for name, osc in SCENES.items():
         if not all(word in name for word in given.words):
             continue
@@ -116,6 +119,11 @@ def main():
                     f"{time.perf_counter() - began:.0f} s",
                     flush=True,
                 )
+                rows.append({
+                    "scene": name, "exit": result.exit_of(energy), "energy": f"{energy.value:.12g}",
+                    "minimized": f"{found.action:.12g}", "difference": f"{found.action / energy.value - 1:.1e}",
+                })  # fmt: skip
+                table_file.write(given.csv, rows, timed=False)
 
 
 if __name__ == "__main__":

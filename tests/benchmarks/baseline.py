@@ -11,15 +11,15 @@ on the clock, so that a busy machine finds less. An exact energy outside its bou
 """
 
 import argparse
-import csv
 import json
 import statistics
 import time
 from pathlib import Path
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.apart import apart
-from tests.benchmarks.gallery import SCENES
+from tests.benchmarks.gallery import SCENES, exact
 from tests.extremes.scenes_of_action import ActionScene, scenes
 from vibrokit.errors import VibrokitError
 from vibrokit.reproduction.published import scenes as names_of_the_paper
@@ -51,7 +51,7 @@ def of_gallery(osc, limit):
     exit_ = vk.LeaveBasin() if len(structure.attractors) > 1 or escapes else vk.FirstContact()
     for attractor in structure.attractors:
         analyzer = vk.LeastAction(source=attractor.label, exit=exit_)
-        yield from rows_of(analyzer, osc, structure, limit, attractor.name)
+        yield from rows_of(analyzer, osc, structure, limit, attractor.name, exact)
 
 
 def of_paper(osc, limit):
@@ -67,16 +67,23 @@ def of_extremes(scene: ActionScene, limit):
     if scene.contact is None:
         by_place = sorted(structure.attractors, key=lambda attractor: attractor.points[0, 0])
         known = scene.exact if len(scene.exact) == len(by_place) else ()
-        exact = {attractor.label: value for attractor, value in zip(by_place, known, strict=False)}
+        values = {attractor.label: value for attractor, value in zip(by_place, known, strict=False)}
         analyzer = vk.LeastAction(**small)
     else:
-        exact = {attractor.label: scene.contact for attractor in structure.attractors if not attractor.impacts}
+        values = {attractor.label: scene.contact for attractor in structure.attractors if not attractor.impacts}
         analyzer = vk.LeastAction(exit=vk.FirstContact(), **small)
-    yield from rows_of(analyzer, osc, structure, limit, exact=exact)
+
+    def known(osc, structure, energy):
+        return values.get(energy.source)
+
+    yield from rows_of(analyzer, osc, structure, limit, known=known)
 
 
-def rows_of(analyzer, osc, structure, limit, name="", exact=None):
-    """One row for each exit, or one that says why there is none."""
+def rows_of(analyzer, osc, structure, limit, name="", known=lambda *_: None):
+    """One row for each exit, or one that says why there is none.
+
+    `known` returns the exact energy of an exit, given scene, structure and energy, or None.
+    """
     began = time.process_time()
     try:
         result = analyzer.run(osc, structure, time_limit=limit)
@@ -91,7 +98,7 @@ def rows_of(analyzer, osc, structure, limit, name="", exact=None):
         row = {
             "exit": result.exit_of(energy), "energy": energy.value, "lower": energy.lower, "upper": energy.upper,
             "bound": energy.bound.value, "error": energy.numerical_error,
-            "exact": (exact or {}).get(energy.source, ""), **rest,
+            "exact": known(osc, structure, energy), **rest,
         }  # fmt: skip
         if certificate is not None:
             row |= {"residual": f"{certificate.residual:.1e}", "angle": f"{certificate.transversality:.1e}"}
@@ -107,30 +114,22 @@ def alone(name, limit):
 
 def run(table, words, limit):
     """Append the rows of the scenes that the table lacks."""
-    known = {row["scene"] for row in read(table)} if table.exists() else set()
-    with table.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        if not known:
-            writer.writeheader()
-        for name in all_scenes():
-            if name in known or (words and not any(word in name for word in words)):
-                continue
-            rows = [{"scene": name, **row} for row in alone(name, limit)]
-            writer.writerows(rows)
-            file.flush()
-            for row in rows:
-                print("  ".join(str(row.get(column, "")) for column in COLUMNS), flush=True)
+    if not table.exists():
+        table_file.begin(table, COLUMNS, tolerance=SAME)
+    known = {row["scene"] for row in table_file.read(table)}
+    for name in all_scenes():
+        if name in known or (words and not any(word in name for word in words)):
+            continue
+        rows = [{"scene": name, **row} for row in alone(name, limit)]
+        table_file.append(table, COLUMNS, rows)
+        for row in rows:
+            print("  ".join(str(row.get(column, "")) for column in COLUMNS), flush=True)
     summarize(table)
-
-
-def read(table):
-    with table.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def summarize(table):
     """Print the share that is certified, the seconds, and what is wrong."""
-    rows = [row for row in read(table) if row["energy"]]
+    rows = [row for row in table_file.read(table) if row["energy"]]
     for group in dict.fromkeys(row["scene"].partition(":")[0] for row in rows):
         own = [row for row in rows if row["scene"].startswith(group)]
         certified = sum(row["residual"] != "" for row in own)
@@ -170,7 +169,7 @@ def worse(before, after):
 
 def compare(before, after):
     """Print the exits that are missing or worse, of the scenes that both tables have, and a summary of each table."""
-    old, new = ({(row["scene"], row["exit"]): row for row in read(table)} for table in (before, after))
+    old, new = ({(row["scene"], row["exit"]): row for row in table_file.read(table)} for table in (before, after))
     both = {scene for scene, _ in old} & {scene for scene, _ in new}
     for key, row in old.items():
         if key[0] in both:

@@ -1,6 +1,6 @@
 """Seconds for a basin of hertz-0.570: vibrokit's, whose cells share answers, beside the best scalar loop.
 
-    python -m tests.benchmarks.basins [--rounds 5] [--cells 400] [--threads 2]
+    python -m tests.benchmarks.basins [--rounds 5] [--cells 400] [--threads 2] [--csv FILE]
 
 The scalar loops map each cell's centre, 256 classical Runge-Kutta steps a period, until it is within 1e-3 of a known
 attractor, at most 500 periods: forcing tabulated, a square root in place of a power, cells handed to the threads in
@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.by_hand import FLAGS, FORCING, SCENE, STEPS, branching, folded, runge_kutta
-from tests.benchmarks.races import fastest, race, report, timed
+from tests.benchmarks.races import fastest, race, report, table, timed
 from vibrokit.structure.basins.classifier import BasinClassifier
 from vibrokit.structure.basins.grid import classify_grid
 
@@ -86,6 +87,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--cells", type=int, default=400)
     parser.add_argument("--threads", type=int, default=2)
+    table_file.add_option(parser)
     options = parser.parse_args()
     numba.set_num_threads(options.threads)
     structure = vk.find_structure(SCENE, cells=(10, 10), saddles=False, manifolds=False)
@@ -109,6 +111,11 @@ def main() -> None:
         name: f"{100 * (1 - everywhere):10.3f}% equal, {100 * (1 - far):.3f}% of those {FAR} cells from another label"
         for name, (everywhere, far) in wrong.items()
     })  # fmt: skip
+    equal = {
+        name: {"equal": f"{1 - everywhere:.5f}", "equal_far": f"{1 - far:.5f}"}
+        for name, (everywhere, far) in wrong.items()
+    }
+    table_file.write(options.csv, table(costs, ours, equal))
     best = fastest(costs, "scalar")
     print(f"best scalar: {best}, {np.median(np.divide(costs[best], costs[ours])):.1f} times {ours}")
 

@@ -3,7 +3,7 @@
 Each is a process of its own; the first begins with an empty folder of kernels. Two scenes are of the same form if they
 have as many stops and the same stepper and flow: their drivers are the same, and only the code of the scene is new.
 
-    python tests/benchmarks/compile_cost.py
+    python -m tests.benchmarks.compile_cost [--csv FILE]
 """
 
 import argparse
@@ -17,6 +17,7 @@ import time
 import numpy as np
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.kernel import kernel_for
 from vibrokit.symbolic.flow_kind import Flow
@@ -52,14 +53,16 @@ def timed(power: int) -> list[float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--power", type=int, help=argparse.SUPPRESS)
-    power = parser.parse_args().power
+    table_file.add_option(parser)
+    given = parser.parse_args()
+    power = given.power
     if power is not None:
         print(json.dumps(timed(power)))
         return
     with tempfile.TemporaryDirectory() as folder:
         columns = []
         for number in (2, 4, 4):
-            command = [sys.executable, __file__, "--power", str(number)]
+            command = [sys.executable, "-m", "tests.benchmarks.compile_cost", "--power", str(number)]
             run = subprocess.run(
                 command, env=os.environ | {"VIBROKIT_CACHE": folder}, capture_output=True, text=True, check=True
             )
@@ -68,6 +71,11 @@ def main() -> None:
     rows = [(name, flow.value) for name in STEPPERS for flow in FLOWS]
     for (name, flow), first, another, loaded in zip(rows, *columns, strict=True):
         print(f"{name:12}{flow:26}{first:8.1f}{another:9.1f}{loaded:8.2f}")
+    titles = ("stepper", "flow", "first", "another", "loaded")
+    table_file.write(given.csv, [
+        dict(zip(titles, (name, flow, f"{first:.2f}", f"{another:.2f}", f"{loaded:.3f}"), strict=True))
+        for (name, flow), first, another, loaded in zip(rows, *columns, strict=True)
+    ])  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -1,6 +1,16 @@
-"""Scenes of a user's kind for least action; `baseline.py` runs them."""
+"""Scenes of a user's kind for least action, and exact energies of some; `baseline.py` runs them.
 
+    python -m tests.benchmarks.gallery --scenes docs/data/scenes
+
+writes a scene file of each.
+"""
+
+import argparse
 import math
+import re
+from pathlib import Path
+
+from scipy.optimize import minimize_scalar
 
 import vibrokit as vk
 
@@ -77,3 +87,56 @@ forced("preloaded contact", 1.05, 0.25, natural=0.05, damping=0.3, push=1.0,
 forced("self-excited", 0.0, 0.0, damping=0.0, spring=vk.CustomSpring("x + c*(1 - 5*x**2 + 2*x**4)*v", c=0.1))
 forced("self-excited, one way", 0.0, 0.0, damping=0.0, spring=vk.CustomSpring("x + (a - b*x**2)*v", a=0.1, b=0.1))
 forced("first contact", 0.57, 0.1, damping=0.05, stops=both(vk.Hertz(50.0), 0.5))
+
+# Potential energies of the scenes without forcing whose energy is 4ζω_n times the barrier; ω_n is 1.
+POTENTIALS = {
+    "double well": lambda x: x**4 / 4 - x**2 / 2,
+    "double well, overdamped": lambda x: x**4 / 4 - x**2 / 2,
+    "double well, tilted": lambda x: x**4 / 4 - x**2 / 2 - 0.1 * x,
+    "double well, stops": lambda x: x**4 / 4 - x**2 / 2 + 20.0 * 0.4 * max(abs(x) - 0.9, 0.0) ** 2.5,
+    "triple well": lambda x: x**6 / 24 - 5 * x**4 / 16 + x**2 / 2,
+    "triple well, overdamped": lambda x: x**6 / 24 - 5 * x**4 / 16 + x**2 / 2,
+    "cubic well, unforced": lambda x: x**2 / 2 - x**3 / 3,
+    "pendulum, tilted": lambda x: -math.cos(x) - 0.3 * x,
+}
+HILLTOPS = {"cubic well, unforced": 1.0, "pendulum, tilted": math.pi - math.asin(0.3)}  # where motion escapes
+NEAR = 1e-12  # of the place of a hilltop, relative: its potential energy has an error of second order
+
+
+def exact(osc, structure, energy):
+    """The exact energy of an exit to a neighbouring well, an escape or a first contact; None if none is known."""
+    name = next((name for name, each in SCENES.items() if each == osc), None)
+    if name == "first contact":  # 2ζω_n³ times the squared distance of the forced motion from the stop
+        return 2 * 0.05 * (0.5 - abs(0.1 / (1 - 0.57**2 + 2j * 0.05 * 0.57))) ** 2
+    if name not in POTENTIALS:
+        return None
+    potential, places = POTENTIALS[name], [attractor.points[0, 0] for attractor in structure.attractors]
+    start = places[energy.source]
+    if energy.target < 0:
+        top = potential(HILLTOPS[name])
+    else:
+        low, high = sorted((start, places[energy.target]))
+        if any(low < place < high for place in places):
+            return None
+        found = minimize_scalar(lambda x: -potential(x), bounds=(low, high), method="bounded", options={"xatol": NEAR})
+        top = -found.fun
+    return 4 * osc.damping_ratio * (top - potential(start))
+
+
+def file_name(name):
+    """The name of the file of a scene: letters and digits, and the dot of a decimal number."""
+    return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-") + ".toml"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=Path, required=True, help="folder for the scene files")
+    folder = parser.parse_args().scenes
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, osc in SCENES.items():
+        vk.save_scene(osc, folder / file_name(name))
+    print(f"{len(SCENES)} scenes in {folder}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,7 @@
 """Microseconds per trajectory-period of the paper scene's Hamiltonian flow, contestants side by side.
 
-    python -m tests.benchmarks.hamiltonian_ensemble.py [--rounds 12] [--trajectories 8192] [--periods 20] [--threads 2]
+    python -m tests.benchmarks.hamiltonian_ensemble [--rounds 12] [--trajectories 8192] [--periods 20] [--threads 2]
+                                                    [--csv FILE]
 
 The scene is omega = 0.570 with two Hertz stops; five equations (x, v, two momenta, action), classical Runge-Kutta
 with 256 steps a period. Every round runs all contestants one after another, so that ratios compare neighbours in
@@ -19,6 +20,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.by_hand import (
     AMPLITUDE,
     CONSTANT,
@@ -36,7 +38,7 @@ from tests.benchmarks.by_hand import (
     STIFFNESS,
     H,
 )
-from tests.benchmarks.races import fastest, race, report, timed
+from tests.benchmarks.races import fastest, race, report, table, timed
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -261,6 +263,7 @@ def main() -> None:
     parser.add_argument("--trajectories", type=int, default=8192, help=f"rounded up to a multiple of {LANES}")
     parser.add_argument("--periods", type=int, default=20)
     parser.add_argument("--threads", type=int, default=2)
+    table_file.add_option(parser)
     options = parser.parse_args()
     numba.set_num_threads(options.threads)
     starts = start_states(-(-options.trajectories // LANES) * LANES)
@@ -275,6 +278,7 @@ def main() -> None:
             ).items()
         }
     report(costs, REFERENCE, "µs per trajectory-period")
+    table_file.write(options.csv, table(costs, REFERENCE))
     best = fastest(costs, SCALAR)
     print(f"best scalar: {best}, {np.median(np.divide(costs[best], costs[REFERENCE])):.2f} times {REFERENCE}")
 

@@ -1,7 +1,7 @@
 """Ensembles with stops: steppers that locate contacts against RK4, at the same error.
 
     python -m tests.benchmarks.located_ensemble [--rounds 5] [--trajectories 4096] [--periods 5] [--scene hertz-0.570]
-                                                   [--errors 1e-6 1e-10]
+                                                   [--errors 1e-6 1e-10] [--csv FILE]
 
 Trajectories start near the last attractor of the scene, with momenta of 1e-3, and cost microseconds per trajectory and
 period, on all threads. The error is the median distance in (x, v), after all periods, from the reference: FreeFlight at
@@ -15,7 +15,8 @@ import warnings
 import numpy as np
 
 import vibrokit as vk
-from tests.benchmarks.races import race, report, timed
+from tests.benchmarks import table_file
+from tests.benchmarks.races import race, report, table, timed
 from vibrokit.kernels.ensemble import compiled_kernel, run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -64,15 +65,17 @@ class Contest:
         return kind(float(f"{np.exp(fine):.3g}"))
 
     def measure(self, steppers, rounds):
-        """Print a row for each stepper."""
+        """Print a row for each stepper, and return the rows."""
         for stepper in steppers:
             compiled_kernel(self.scene, self.flow, stepper)
         runs = race({repr(one): lambda _, one=one: timed(self.run, one) for one in steppers}, rounds)
         each = 1e6 / len(self.starts) / self.periods
-        errors = {repr(one): f"   error {self.error(one, runs[repr(one)][-1][0]):.1e}" for one in steppers}
+        errors = {repr(one): self.error(one, runs[repr(one)][-1][0]) for one in steppers}
         costs = {name: [each * seconds for _, seconds in times] for name, times in runs.items()}
         print(self.flow.value)
-        report(costs, repr(steppers[0]), "µs", errors)
+        report(costs, repr(steppers[0]), "µs", {name: f"   error {error:.1e}" for name, error in errors.items()})
+        more = {name: {"error": f"{error:.1e}"} for name, error in errors.items()}
+        return [{"flow": self.flow.value} | row for row in table(costs, repr(steppers[0]), more)]
 
 
 def main():
@@ -82,7 +85,9 @@ def main():
     parser.add_argument("--periods", type=int, default=5)
     parser.add_argument("--scene", default="hertz-0.570")
     parser.add_argument("--errors", type=float, nargs="+")
+    table_file.add_option(parser)
     given = parser.parse_args()
+    rows = []
     warnings.simplefilter("ignore")  # RK4 has too few steps for stiff stops
     scene = vk.load_scene(given.scene)
     point = vk.find_structure(scene, manifolds=False).attractors[-1].points[0, :2]
@@ -92,7 +97,8 @@ def main():
             located = [contest.at_error(kind, each) for kind in LOCATED for each in given.errors]
         else:
             located = [kind(each) for kind in LOCATED for each in TOLERANCES]
-        contest.measure((*FIXED, *located), given.rounds)
+        rows += contest.measure((*FIXED, *located), given.rounds)
+    table_file.write(given.csv, rows)
 
 
 if __name__ == "__main__":

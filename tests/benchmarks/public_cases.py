@@ -1,10 +1,11 @@
 """Scenes of other people with known right values, by default settings: the share of the values that is met.
 
-    python -m tests.benchmarks.public_cases [WORDS …] [--limit 300] [--list]
+    python -m tests.benchmarks.public_cases [WORDS …] [--limit 300] [--csv FILE] [--list]
 
 `public_cases.toml` has the scenes, their sources, the right values and the tolerances. Each case whose name has all
 the words runs in a process of its own. A row is one value: whether it is met within the tolerance beside it, the
-question, what was found, and what is right.
+question, what was found, and what is right. A CSV file gets the rows of each case when it ends, and a run that was cut
+goes on with the cases that the file lacks.
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ from typing import Any
 import numpy as np
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.apart import apart
 from vibrokit.errors import VibrokitError
 from vibrokit.scene_file import scene_from_data
 
 TABLE = Path(__file__).with_suffix(".toml")
+COLUMNS = ("case", "question", "found", "right", "tolerance", "used", "met", "remark", "source", "seconds")
 _ESCAPE = "escape"
 """Instead of a place, as the end of an exit: out of the region."""
 
@@ -217,6 +220,35 @@ def met(check: Mapping[str, Any], found: Any) -> bool:
     return bool(np.all(np.abs(np.subtract(found, right)) <= allowed))
 
 
+def used(check: Mapping[str, Any], found: Any) -> float:
+    """The part of the tolerance that an answer takes: its difference from the right value, over what is allowed."""
+    right = check["value"]
+    if isinstance(right, str) or np.shape(found) != np.shape(right):
+        return 0.0 if found == right else math.inf
+    allowed = check.get("absolute", 0.0) + check.get("relative", 0.0) * np.abs(right)
+    difference = np.abs(np.subtract(found, right))
+    return float(np.max(np.where(difference == 0, 0.0, difference / np.where(allowed > 0, allowed, 1e-300))))
+
+
+def csv_rows(name: str, source: str, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The answers of a case as rows of a CSV file."""
+    return [
+        {
+            "case": name,
+            "question": row["check"]["question"],
+            "found": _exactly(row["found"]),
+            "right": _exactly(row["check"]["value"]),
+            "tolerance": " + ".join(f"{row['check'][kind]:g} {kind}" for kind in _TOLERANCES if kind in row["check"]),
+            "used": f"{used(row['check'], row['found']):.2g}",
+            "met": "yes" if met(row["check"], row["found"]) else "no",
+            "remark": row["why"],
+            "source": source,
+            "seconds": f"{row['seconds']:.2f}",
+        }
+        for row in rows
+    ]
+
+
 def answers(case: Case) -> list[dict[str, Any]]:
     """An answer to each question of a case, or the reason why there is none."""
     rows = []
@@ -231,7 +263,8 @@ def answers(case: Case) -> list[dict[str, Any]]:
     return rows
 
 
-_NOT_ASKED = {"question", "value", "absolute", "relative", "by"}
+_TOLERANCES = ("absolute", "relative")
+_NOT_ASKED = {"question", "value", "by", *_TOLERANCES}
 
 
 def answers_apart(name: str, limit: float) -> list[dict[str, Any]]:
@@ -259,12 +292,20 @@ def _shown(value: Any) -> str:
     return f"{value:.7g}" if isinstance(value, int | float) else str(value)
 
 
+def _exactly(value: Any) -> str:
+    """A value to twelve digits; a list with spaces between its numbers."""
+    if isinstance(value, list):
+        return " ".join(map(_exactly, value))
+    return f"{value:.12g}" if isinstance(value, int | float) else str(value)
+
+
 def main() -> None:
     """Run the cases that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
     parser.add_argument("--limit", type=float, default=300.0, help="seconds of one search")
     parser.add_argument("--list", action="store_true")
+    table_file.add_option(parser)
     parser.add_argument("--case", help=argparse.SUPPRESS)
     given = parser.parse_args()
     table = read_cases()
@@ -276,9 +317,16 @@ def main() -> None:
         print("\n".join(f"{name:36s} {table[name]['source']}" for name in names))
         return
     right = []
+    if given.csv is not None:
+        if not given.csv.exists():
+            table_file.begin(given.csv, COLUMNS)
+        known = {row["case"] for row in table_file.read(given.csv)}
+        names = [name for name in names if name not in known]
     for name in names:
         rows = answers_apart(name, given.limit)
         show(name, rows)
+        if given.csv is not None:
+            table_file.append(given.csv, COLUMNS, csv_rows(name, table[name]["source"], rows))
         right.append([met(row["check"], row["found"]) for row in rows])
     print(
         f"\n{sum(map(all, right))} of {len(right)} cases met, {sum(map(sum, right))} of {sum(map(len, right))} values"

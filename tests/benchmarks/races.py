@@ -38,6 +38,18 @@ def report(costs, reference, unit, more=None):
         print(f"{name:34}{quartiles(values)}{quartiles(ratios)}{(more or {}).get(name, '')}", flush=True)
 
 
+def table(costs, reference, more=None):
+    """The same as rows of a CSV file: medians and quartiles of the costs, and of their ratios to the reference's."""
+    rows = []
+    for name, values in costs.items():
+        row = {"contestant": name}
+        for column, numbers in (("cost", values), ("ratio", np.divide(values, costs[reference]))):
+            low, middle, high = np.percentile(numbers, [25, 50, 75])
+            row |= {column: f"{middle:.3g}", f"{column}_25": f"{low:.3g}", f"{column}_75": f"{high:.3g}"}
+        rows.append(row | (more or {}).get(name, {}))
+    return rows
+
+
 def fastest(costs, beginning):
     """The contestant with the lowest median, of those whose names begin so."""
     return min((name for name in costs if name.startswith(beginning)), key=lambda name: np.median(costs[name]))

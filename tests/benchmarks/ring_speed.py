@@ -1,6 +1,6 @@
 """Seconds for the published ring on hertz-0.570: vibrokit's kernel beside the best scalar loop.
 
-    python -m tests.benchmarks.ring_speed.py [--rounds 20] [--points 100000] [--threads 2] [--source 0 1]
+    python -m tests.benchmarks.ring_speed [--rounds 20] [--points 100000] [--threads 2] [--source 0 1] [--csv FILE]
 
 Starts lie on a circle of radius 1e-6 round an attractor, with the momentum of the linearised quasi-potential, and are
 carried by Hamilton's equations, classical Runge-Kutta with 256 steps a period, until they are in a cell of another
@@ -24,6 +24,7 @@ import numpy as np
 from numba import njit, prange
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.by_hand import FORCING, SCENE, STEPS, H
 from tests.benchmarks.hamiltonian_ensemble import (
     Array,
@@ -34,7 +35,7 @@ from tests.benchmarks.hamiltonian_ensemble import (
     naive_slopes,
     runge_kutta,
 )
-from tests.benchmarks.races import fastest, race, report
+from tests.benchmarks.races import fastest, race, report, table
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.shooting.shooting import default_effort
 from vibrokit.analyzers.shooting.starts import Ring
@@ -145,12 +146,13 @@ def check(contestants: dict[str, Contestant], starts: Array) -> None:
     print(f"  of {len(starts)} paths {ways}; {periods.mean():.1f} periods a path; least action "
           f"{state[status == LEFT_BASIN, -1].min():.6g}")  # fmt: skip
     others = {name: contestant(starts) for name, contestant in contestants.items() if name != OURS}
+    allowed = max(0.01, 2 * np.mean((nudged[1] != periods) | (nudged[2] != status)))
     for name, ends in {"starts moved by a bit": nudged, **others}.items():
         same = (ends[1] == periods) & (ends[2] == status)
         apart = np.abs(ends[0][same, -1] / state[same, -1] - 1)
         print(f"  {name:24} same end {100 * same.mean():9.4f}%   action differs by {np.median(apart):8.1e} (median), "
               f"{np.quantile(apart, 0.99):8.1e} (99 %)")  # fmt: skip
-        assert same.mean() > 0.99, f"{name} ends otherwise"
+        assert same.mean() > 1 - allowed, f"{name} ends otherwise"
         assert np.median(apart) < 1e-6, f"{name} pays otherwise"
 
 
@@ -172,7 +174,9 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--source", type=int, nargs="+", default=[0, 1])
+    table_file.add_option(parser)
     options = parser.parse_args()
+    rows = []
     numba.set_num_threads(options.threads)
     structure = vk.find_structure(SCENE, cells=(200, 200), saddles=False, manifolds=False)
     with futures.ThreadPoolExecutor(options.threads) as pool:
@@ -198,6 +202,9 @@ def main() -> None:
             print(f"  {len(starts)} points, in {options.rounds} rounds", flush=True)
             costs = processor_seconds(ours | {best: scalars[best]} | plain, starts, options.rounds)
             report(costs, OURS, "processor seconds", {name: f"{sum(each):9.2f} in all" for name, each in costs.items()})
+            totals = {name: {"total": f"{sum(each):.2f}"} for name, each in costs.items()}
+            rows += [{"attractor": attractor.name} | row for row in table(costs, OURS, totals)]
+    table_file.write(options.csv, rows)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Nanoseconds per trajectory-step of the noisy paper scene, one thread, contestants side by side.
 
-    python -m tests.benchmarks.stochastic_step [--rounds 12] [--trajectories 2048] [--periods 8]
+    python -m tests.benchmarks.stochastic_step [--rounds 12] [--trajectories 2048] [--periods 8] [--csv FILE]
 
 The scene is omega = 0.570 with two Hertz stops. One step draws two normals, kicks the velocity, takes one RK4
 step of the drift and kicks again. Every round runs all contestants one after another, so that ratios compare
@@ -22,8 +22,9 @@ import numpy as np
 from numba import njit
 
 import vibrokit as vk
+from tests.benchmarks import table_file
 from tests.benchmarks.by_hand import FLAGS, FORCING, SCENE, STEPS, H, branching, folded, runge_kutta
-from tests.benchmarks.races import race, report
+from tests.benchmarks.races import race, report, table
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.kernels.intrinsics import use_widest_registers
 from vibrokit.kernels.streams import normal_pair, seed_lane, streams_of
@@ -181,6 +182,7 @@ def main() -> None:
     parser.add_argument("--trajectories", type=int, default=2048, help=f"rounded up to a multiple of {LANES}")
     parser.add_argument("--periods", type=int, default=8)
     parser.add_argument("--cc", default="cc", help="C compiler")
+    table_file.add_option(parser)
     options = parser.parse_args()
     trajectories = -(-options.trajectories // LANES) * LANES
     with tempfile.TemporaryDirectory() as folder:
@@ -195,10 +197,12 @@ def main() -> None:
             options.rounds,
         )
     final = {name: np.mean([(one.mean, one.spread) for one in each], axis=0) for name, each in runs.items()}
+    costs = {name: [one.nanoseconds for one in each] for name, each in runs.items()}
     report(
-        {name: [one.nanoseconds for one in each] for name, each in runs.items()}, REFERENCE, "ns per step",
+        costs, REFERENCE, "ns per step",
         {name: f"   final x {mean:.5f}, spread {spread:.5f}" for name, (mean, spread) in final.items()},
     )  # fmt: skip
+    table_file.write(options.csv, table(costs, REFERENCE))
 
 
 if __name__ == "__main__":
