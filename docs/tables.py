@@ -337,9 +337,9 @@ def _races(data: Path) -> Page:
         return []
     page = _section(
         "Against loops written by hand",
-        "Programs in Numba and C for ``hertz-0.570`` alone, with constants inlined and tabulated forcing; the naive one "
-        "evaluates the formula as written. Before a race, the results of the contestants are compared. Ratios are to the "
-        "first program of each race.",
+        "Programs in Numba and C for ``hertz-0.570`` alone, with constants inlined and tabulated forcing; the naive "
+        "one evaluates the formula as written. Before a race, the results of the contestants are compared. Ratios are "
+        "to the first program of each race.",
         *(table for table, _ in tables),
     )
     rows = []
@@ -362,9 +362,9 @@ def _compilation(data: Path) -> Page:
         return []
     page = _section(
         "Compilation",
-        "Seconds until a kernel of a scene with one stop runs: of the first scene with an empty folder of kernels "
-        "(the flows one after another), of another scene with a spring or a law of another form, and loaded from "
-        "disk by another process.",
+        "Processor seconds until a kernel of a scene with one stop runs: of the first scene with an empty folder of "
+        "kernels (the flows one after another), of another scene with a spring or a law of another form, and loaded "
+        "from disk by another process.",
         table,
     )
     steppers = dict.fromkeys(row["stepper"] for row in table.rows)

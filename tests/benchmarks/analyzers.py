@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.analyzers [--scene hertz-0.570] [--sources clear hammering] [--csv FILE]
 
-Each analyzer runs on each source alone, after a run of the same that compiles its kernels or loads them: the second
-counts. A row has ΔU (m² s⁻³), or, of the methods at finite noise, ln of the mean exit time in section intervals at the
+Each analyzer runs on each source alone. A first run of this program compiles kernels; times are those of a second one.
+A row has ΔU (m² s⁻³), or, of the methods at finite noise, ln of the mean exit time in section intervals at the
 intensity of the scene.
 """
 
@@ -20,8 +20,7 @@ RATES = (vk.SGCM, vk.MFET)
 
 
 def timed(work):
-    """What some work returns, and the processor seconds of all threads, of its second call."""
-    work()
+    """What some work returns, and its processor seconds of all threads."""
     began = time.process_time()
     return work(), time.process_time() - began
 

@@ -1,4 +1,4 @@
-"""Seconds until a kernel runs: of the first scene of a form, of another scene of the form, and loaded from disk.
+"""Processor seconds until a kernel runs: of the first scene of a form, of another one of the form, and loaded from disk.
 
 Each is a process of its own; the first begins with an empty folder of kernels. Two scenes are of the same form if they
 have as many stops and the same stepper and flow: their drivers are the same, and only the code of the scene is new.
@@ -43,10 +43,10 @@ def timed(power: int) -> list[float]:
     for name, stepper in STEPPERS.items():
         for flow in FLOWS:
             osc = scene(name, power)
-            began = time.perf_counter()
+            began = time.process_time()
             equations = kernel_for(osc, flow, stepper).module.EQUATIONS
             run_ensemble(osc, flow, stepper, np.full((1, equations), 0.1))
-            seconds.append(time.perf_counter() - began)
+            seconds.append(time.process_time() - began)
     return seconds
 
 
