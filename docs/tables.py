@@ -21,6 +21,7 @@ COMMENT = "# "
 EXACT_BOUNDS = ("certified", "exact")  # bounds on both sides that are narrower than what a search excludes
 MOST_DIGITS = 10
 WIDTH = 120
+COUNTS = ("exits", "certified or exact", "closed forms", "within bounds", "largest difference")
 SHOWN = ("energy", "mean_time")  # questions of the public cases whose answers are listed one by one
 
 
@@ -168,12 +169,13 @@ def _extremes(data: Path) -> Page:
         "Stiffnesses from 1 to 1e8, damping ratios from 1e-4 to 2, and distances from a fold or from grazing "
         "contact of 1e-8 to 1e-2. Where a closed form exists, the columns count the exits whose bounds contain "
         "it, and have the largest relative difference of the energies that are certified or exact. The other "
-        "energies are upper bounds and estimates.",
+        "energies are upper bounds and estimates. A scene without an energy has one attractor, or the time limit "
+        "stopped a search.",
         table,
     )
     return page + _grid(
-        ("scenes", "exits", "certified or exact", "closed forms", "within bounds", "largest difference"),
-        ((family, *_counts(rows)) for family, rows in families.items()),
+        ("family", "scenes", "without an energy", *COUNTS),
+        ((family, *_scenes(rows), *_counts(rows)) for family, rows in families.items()),
     )
 
 
@@ -192,7 +194,7 @@ def _gallery_exact(data: Path) -> Page:
         table,
     )
     return page + _grid(
-        ("scene", "exits", "certified or exact", "closed forms", "within bounds", "largest difference"),
+        ("scene", *COUNTS),
         ((scene, *_counts(rows)) for scene, rows in scenes.items()),
     )
 
@@ -411,6 +413,12 @@ def _energy(row: Row) -> tuple[str, ...]:
 
 def _most(row: Row, value: float) -> str:
     return "≤ " if float(row["upper"]) <= value * (1 + 1e-6) else ""
+
+
+def _scenes(rows: Sequence[Row]) -> tuple[str, str]:
+    """Scenes, and those without an energy."""
+    names = {row["scene"] for row in rows}
+    return str(len(names)), str(len(names - {row["scene"] for row in rows if row["energy"]}))
 
 
 def _counts(rows: Sequence[Row]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Processor seconds until a kernel runs: of the first scene of a form, of another one of the form, and loaded from disk.
+"""Processor seconds until a kernel runs: of the first scene of a form, of another of the form, and loaded from disk.
 
 Each is a process of its own; the first begins with an empty folder of kernels. Two scenes are of the same form if they
 have as many stops and the same stepper and flow: their drivers are the same, and only the code of the scene is new.
