@@ -21,6 +21,7 @@ COMMENT = "# "
 EXACT_BOUNDS = ("certified", "exact")  # bounds on both sides that are narrower than what a search excludes
 MOST_DIGITS = 10
 WIDTH = 120
+PAPER, OTHER = "Scenes of the paper", "Other scenes"
 COUNTS = ("exits", "certified or exact", "closed forms", "within bounds", "largest difference")
 SHOWN = ("energy", "mean_time")  # questions of the public cases whose answers are listed one by one
 
@@ -103,10 +104,10 @@ def barriers(docs: Path) -> None:
         "bound.",
         line="=",
     )
-    data = docs / "data"
-    for name, title in (("paper", "Scenes of the paper"), ("gallery", "Gallery of scenes")):
-        if table := _table(data, name):
-            page += _section(title, "", table) + _barrier_rows(table)
+    if table := _table(docs / "data", "gallery"):
+        page += [table.source, ""]
+        for title, rows in _by_kind(table.rows).items():
+            page += _section(title, "") + _barrier_rows(rows)
     _save(docs / "barriers.rst", page)
 
 
@@ -386,10 +387,19 @@ def _compilation(data: Path) -> Page:
 # --- rows of energies
 
 
-def _barrier_rows(table: Table) -> Page:
+def _by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """Rows with an energy: those of the scenes of the paper, and the others."""
+    kinds: dict[str, list[Row]] = {PAPER: [], OTHER: []}
+    for row in rows:
+        if row["energy"]:
+            kinds[PAPER if _name(row["scene"]).startswith("hertz-") else OTHER].append(row)
+    return {title: own for title, own in kinds.items() if own}
+
+
+def _barrier_rows(rows: Sequence[Row]) -> Page:
     return _grid(
         ("scene", "exit", "ΔU", "lower", "upper", "bound", "error"),
-        ((_scene_link(_name(row["scene"])), row["exit"], *_energy(row)) for row in table.rows if row["energy"]),
+        ((_scene_link(_name(row["scene"])), row["exit"], *_energy(row)) for row in rows),
     )
 
 

@@ -30,6 +30,7 @@ from vibrokit.scene_file import scene_from_data
 
 TABLE = Path(__file__).with_suffix(".toml")
 COLUMNS = ("case", "question", "found", "right", "tolerance", "used", "met", "remark", "source", "seconds")
+_SAME = "the same"
 _ESCAPE = "escape"
 """Instead of a place, as the end of an exit: out of the region."""
 
@@ -203,6 +204,16 @@ def read_cases() -> dict[str, dict[str, Any]]:
     return {name: rows[row["like"]] | row if "like" in row else row for name, row in rows.items()}
 
 
+def sources(table: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """The source of each case; "the same" stands for the names in that of the case before."""
+    found, names = dict[str, str](), ""
+    for name, row in table.items():
+        own, _, how = row["source"].partition(";")
+        names = names if own == _SAME else own
+        found[name] = "; ".join(part for part in (names, how.strip()) if part)
+    return found
+
+
 def made(row: Mapping[str, Any], limit: float) -> Case:
     """The case of a row of the table."""
     osc = vk.load_scene(row["scene"]) if isinstance(row["scene"], str) else scene_from_data(row["scene"])
@@ -326,7 +337,7 @@ def main() -> None:
         rows = answers_apart(name, given.limit)
         show(name, rows)
         if given.csv is not None:
-            table_file.append(given.csv, COLUMNS, csv_rows(name, table[name]["source"], rows))
+            table_file.append(given.csv, COLUMNS, csv_rows(name, sources(table)[name], rows))
         right.append([met(row["check"], row["found"]) for row in rows])
     print(
         f"\n{sum(map(all, right))} of {len(right)} cases met, {sum(map(sum, right))} of {sum(map(len, right))} values"
