@@ -19,7 +19,7 @@ Page = list[str]
 
 COMMENT = "# "
 EXACT_BOUNDS = ("certified", "exact")  # bounds on both sides that are narrower than what a search excludes
-MOST_DIGITS = 10
+FEWEST_DIGITS, MOST_DIGITS = 5, 10
 WIDTH = 120
 PAPER, OTHER = "Scenes of the paper", "Other scenes"
 COUNTS = ("exits", "certified or exact", "closed forms", "within bounds", "largest difference")
@@ -415,8 +415,8 @@ def file_name(name: str) -> str:
 def _energy(row: Row) -> tuple[str, ...]:
     """Energy with as many digits as its error has, its bounds, their kind and the error."""
     value, lower, upper, error = (float(row[column]) for column in ("energy", "lower", "upper", "error"))
-    relative = error / value if row["residual"] and value > 0 else math.nan
-    digits = MOST_DIGITS if relative < 10.0**-MOST_DIGITS else 6
+    relative = max(error / value, 1e-16) if row["residual"] and value > 0 else math.nan
+    digits = FEWEST_DIGITS if math.isnan(relative) else min(max(int(-math.log10(relative)), FEWEST_DIGITS), MOST_DIGITS)
     shown = f"{value:.{digits}g}" if row["bound"] in EXACT_BOUNDS else f"{_most(row, value)}{value:.{digits}g}"
     return shown, f"{lower:.6g}", f"{upper:.{digits}g}", row["bound"], "" if math.isnan(relative) else f"{relative:.0e}"
 
