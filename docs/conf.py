@@ -10,6 +10,7 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
 import findings  # noqa: E402
+import tables  # noqa: E402
 
 from vibrokit import __version__  # noqa: E402
 
@@ -49,3 +50,4 @@ html_static_path = ["static"]
 html_css_files = ["manual.css"]
 
 findings.write(DOCS)
+tables.write(DOCS)

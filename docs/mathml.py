@@ -1,5 +1,7 @@
 """Formulas as MathML, made when the manual is built: pages need neither a script nor a network to show them."""
 
+import re
+
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
@@ -14,9 +16,12 @@ def rendered(node: nodes.Element, display: str) -> str:
     if display == "block" and r"\\" in tex and r"\begin" not in tex:
         tex = rf"\begin{{align*}}{tex}\end{{align*}}"
     try:
-        return convert(tex, display=display).replace("sans-serif", "normal")  # for browsers
+        made = convert(tex, display=display)
     except Exception as error:
         raise ExtensionError(f"{node.source}: the formula {tex!r} has no MathML ({error!r}).") from error
+    if unknown := re.search(r"\\\w+", made):
+        raise ExtensionError(f"{node.source}: the formula {tex!r} has the unknown command {unknown[0]}.")
+    return made.replace('mathvariant="sans-serif"', 'mathvariant="normal"')  # browsers know no other upright letters
 
 
 def visit_inline(self: HTML5Translator, node: nodes.math) -> None:
