@@ -12,14 +12,15 @@ from sphinx.writers.html5 import HTML5Translator
 
 def rendered(node: nodes.Element, display: str) -> str:
     """Return the MathML of a formula; one that cannot be read stops the build."""
-    tex = node.astext().replace("{aligned}", "{align*}")  # the converter knows only the latter
+    tex = node.astext().replace("{aligned}", "{align*}")  # the converter knows only the latter,
+    tex = re.sub(r"\\[bB]igg?[lr](?=\\)", "", tex)  # and sizes only of brackets that are one character
     if display == "block" and r"\\" in tex and r"\begin" not in tex:
         tex = rf"\begin{{align*}}{tex}\end{{align*}}"
     try:
         made = convert(tex, display=display)
     except Exception as error:
         raise ExtensionError(f"{node.source}: the formula {tex!r} has no MathML ({error!r}).") from error
-    if unknown := re.search(r"\\\w+", made):
+    if unknown := re.search(r"\\\S[^<]*", made):
         raise ExtensionError(f"{node.source}: the formula {tex!r} has the unknown command {unknown[0]}.")
     return made.replace('mathvariant="sans-serif"', 'mathvariant="normal"')  # browsers know no other upright letters
 
