@@ -33,7 +33,7 @@ def draw(assessment):
         rows.append((time.log_value, time.log_lower, time.log_upper))
     middle, lower, upper = np.exp(np.array(rows).T)
     ax.fill_between(levels, lower, upper, color="tab:blue", alpha=0.25, linewidth=0, label="95 % interval")
-    ax.plot(levels, middle, color="tab:blue", label="mean time τ")
+    ax.plot(levels, middle, color="tab:blue", label="mean time")
     own = assessment.mean_time("clear")
     ax.plot([2 * own.intensity / GRAVITY**2], [own.value], "o", color="black", label="the scene's level")
     for name, time in TIMES.items():
@@ -41,12 +41,12 @@ def draw(assessment):
         ax.annotate(name, (levels[-1], time), ha="right", va="bottom", color="0.3")
     ax.set(
         xscale="log", yscale="log", xlim=(levels[0], levels[-1]), ylim=(1.0, 1e11),
-        xlabel="one-sided spectral density G (g_n²/Hz)", ylabel="mean time in the clear state τ (s)",
+        xlabel="one-sided spectral density $G$ ($g_n^2$/Hz)", ylabel="mean time in the clear state τ (s)",
     )  # fmt: skip
     ticks = [1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 6e-6]
     ax.set_xticks(ticks, [f"{1e6 * tick:g}·10⁻⁶" for tick in ticks])
     ax.minorticks_off()
-    ax.legend(frameon=False, loc="center right")
+    ax.legend(frameon=False, loc="lower left")
     return figure
 
 
