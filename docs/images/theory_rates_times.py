@@ -48,7 +48,7 @@ def draw(exact):
         times = exit_times(ratio)
         remain = 1 - np.arange(1, len(times) + 1) / WALKERS
         mean = (times.sum() + (WALKERS - len(times)) * times[-1]) / len(times)
-        left.plot(times / mean, remain, color=colour, label=f"ΔU/D = {ratio}, mean {mean:.3g} s")
+        left.plot(times / mean, remain, color=colour, label=f"ΔU/D = {ratio}, mean {mean:.0f} s")
     law = np.linspace(0, 3, 2)
     left.plot(law, np.exp(-law), "k--", linewidth=1, label="exp(−t/τ)")
     left.set(yscale="log", ylim=(0.05, 1.1), xlim=(0, 3), xlabel="time over mean time", ylabel="share not left, G")
