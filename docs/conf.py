@@ -10,6 +10,7 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
 import findings  # noqa: E402
+import inventories  # noqa: E402
 import tables  # noqa: E402
 
 from vibrokit import __version__  # noqa: E402
@@ -22,6 +23,7 @@ version = release = __version__
 extensions = [
     "mathml",
     "sphinx.ext.autodoc",
+    "sphinx.ext.intersphinx",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
@@ -31,6 +33,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the numpydoc sections say it in words
 napoleon_google_docstring = False
 napoleon_custom_sections = ["For developers"]
+intersphinx_mapping = inventories.write_inventories(DOCS)
 sphinx_gallery_conf = {
     "examples_dirs": ["../tutorials", "scenes"],
     "gallery_dirs": ["tutorials", "gallery"],
