@@ -22,6 +22,7 @@ version = release = __version__
 
 extensions = [
     "mathml",
+    "type_words",
     "sphinx.ext.autodoc",
     "sphinx.ext.intersphinx",
     "sphinx.ext.napoleon",
