@@ -1,4 +1,7 @@
-"""Draws question_drawing.png, the picture of docs/questions/drawing-to-scene.rst: python docs/images/question_drawing.py"""
+"""Draws question_drawing.png, the picture of docs/questions/drawing-to-scene.rst:
+
+    python docs/images/question_drawing.py
+"""
 
 from pathlib import Path
 

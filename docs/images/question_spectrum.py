@@ -1,4 +1,7 @@
-"""Draws question_spectrum.png, the picture of docs/questions/spectrum-to-d.rst: python docs/images/question_spectrum.py"""
+"""Draws question_spectrum.png, the picture of docs/questions/spectrum-to-d.rst:
+
+    python docs/images/question_spectrum.py
+"""
 
 import math
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Draws theory_path_durations.png, a picture of docs/theory/path-weight.rst: python docs/images/theory_path_durations.py"""
+"""Draws theory_path_durations.png, a picture of docs/theory/path-weight.rst:
+
+    python docs/images/theory_path_durations.py
+"""
 
 from pathlib import Path
 

@@ -3,6 +3,7 @@
 Run it in the root of the repository: it uses tests/klein_kramers.py. It takes about a minute.
 """
 
+import importlib
 import math
 import sys
 from pathlib import Path
@@ -63,8 +64,7 @@ def draw(exact):
 def main():
     """Simulate exits from a double well, and save the picture."""
     sys.path.insert(0, str(ROOT))
-    from tests.klein_kramers import double_well_rate
-
+    double_well_rate = importlib.import_module("tests.klein_kramers").double_well_rate
     draw(double_well_rate).savefig(Path(__file__).with_suffix(".png"), dpi=80)
 
 
