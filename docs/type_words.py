@@ -1,4 +1,4 @@
-"""Leaves plain words of types in docstrings, such as "array of value by name", as text: Sphinx would link each of them."""
+"""Leaves plain words of types in docstrings, such as "array of value by name", as text; Sphinx would link them."""
 
 import builtins
 

@@ -1,6 +1,6 @@
 """Draws question_drawing.png, the picture of docs/questions/drawing-to-scene.rst:
 
-    python docs/images/question_drawing.py
+python docs/images/question_drawing.py
 """
 
 from pathlib import Path

@@ -1,6 +1,6 @@
 """Draws question_spectrum.png, the picture of docs/questions/spectrum-to-d.rst:
 
-    python docs/images/question_spectrum.py
+python docs/images/question_spectrum.py
 """
 
 import math
