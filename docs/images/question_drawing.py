@@ -1,4 +1,4 @@
-"""Draws question_drawing.png, the picture of docs/questions/drawing-to-scene.rst:
+"""Draws question_drawing.png, the picture of docs/questions/drawing-to-scene.rst.
 
 python docs/images/question_drawing.py
 """

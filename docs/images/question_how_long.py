@@ -1,6 +1,6 @@
-"""Draws question_how_long.png, the picture of docs/questions/how-much-noise.rst:
+"""Draws question_how_long.png, the picture of docs/questions/how-much-noise.rst.
 
-    python docs/images/question_how_long.py
+python docs/images/question_how_long.py
 
 It takes some minutes. With the name of a file, the assessment is kept there, and a second call goes on from it.
 """

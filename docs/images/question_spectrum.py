@@ -1,4 +1,4 @@
-"""Draws question_spectrum.png, the picture of docs/questions/spectrum-to-d.rst:
+"""Draws question_spectrum.png, the picture of docs/questions/spectrum-to-d.rst.
 
 python docs/images/question_spectrum.py
 """
