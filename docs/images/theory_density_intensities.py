@@ -23,7 +23,7 @@ def draw(result):
     for place, level in enumerate(LEVELS):
         height = -level * data["log_density"].values[place][:, np.argmin(np.abs(v))]
         left.plot(x, height - np.nanmin(height), label=f"−D ln p, D = {level:g}")
-    places = np.linspace(-2, 0.6, 200)
+    places = np.linspace(-2, 0, 200)
     exact = 4 * ZETA * (places**4 / 4 - places**2 / 2 + 0.25)
     left.plot(places, exact, "k--", linewidth=1.2, label="Ψ = 4ζω_n E")
     left.set(xlim=(-1.7, 0.6), ylim=(-0.01, 0.32), xlabel="x, at v = 0", ylabel="m² s⁻³")
