@@ -99,7 +99,7 @@ POTENTIALS = {
     "cubic well, unforced": lambda x: x**2 / 2 - x**3 / 3,
     "pendulum, tilted": lambda x: -math.cos(x) - 0.3 * x,
 }
-HILLTOPS = {"cubic well, unforced": 1.0, "pendulum, tilted": math.pi - math.asin(0.3)}  # where motion escapes
+HILLTOPS = {"cubic well, unforced": 1.0, "pendulum, tilted": math.pi - math.asin(0.3)}  # over which motion escapes, or starts to turn
 NEAR = 1e-12  # of the place of a hilltop, relative: its potential energy has an error of second order
 
 
@@ -112,7 +112,7 @@ def exact(osc, structure, energy):
         return None
     potential, places = POTENTIALS[name], [attractor.points[0, 0] for attractor in structure.attractors]
     start = places[energy.source]
-    if energy.target < 0:
+    if name in HILLTOPS:
         top = potential(HILLTOPS[name])
     else:
         low, high = sorted((start, places[energy.target]))
