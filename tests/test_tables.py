@@ -21,7 +21,7 @@ MOST_LINES = {"validation": 200, "performance": 120}
 ENERGIES = ("gallery", "extremes")
 CHEAP = {
     "gallery": ("double well, overdamped", "cubic well, unforced"),
-    "public_cases": ("restitution 0.5", "first contact"),
+    "public_cases": ("restitution 0.5",),
 }
 
 

@@ -99,7 +99,8 @@ POTENTIALS = {
     "cubic well, unforced": lambda x: x**2 / 2 - x**3 / 3,
     "pendulum, tilted": lambda x: -math.cos(x) - 0.3 * x,
 }
-HILLTOPS = {"cubic well, unforced": 1.0, "pendulum, tilted": math.pi - math.asin(0.3)}  # over which motion escapes, or starts to turn
+# Places over which motion escapes, or begins to turn over.
+HILLTOPS = {"cubic well, unforced": 1.0, "pendulum, tilted": math.pi - math.asin(0.3)}
 NEAR = 1e-12  # of the place of a hilltop, relative: its potential energy has an error of second order
 
 
