@@ -3,7 +3,6 @@
 The exact rates are those of tests/klein_kramers.py. It takes about a minute.
 """
 
-import importlib
 import math
 import runpy
 from pathlib import Path
