@@ -81,9 +81,10 @@ result.plot(ax=ax)
 
 # %%
 # The momentum :math:`p_2` is the force that the noise must supply. It grows from period to
-# period, and most of the action is spent in the last ten periods.
+# period. Most of the action is spent within ten periods, before the path approaches the
+# saddle.
 
-fig, axes = plt.subplots(2, 2, sharex="col", layout="constrained")
+fig, axes = plt.subplots(2, 2, sharex="col", figsize=(8.4, 4.6), layout="constrained")
 result.plot_history(ax=axes)
 
 # %%

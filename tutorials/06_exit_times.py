@@ -176,8 +176,8 @@ ax.legend(handles=[*artists.points, point, line])
 # The clear-running state of ``hertz-0.570`` has :math:`\Delta U = 7.905\cdot10^{-5}` m² s⁻³
 # (:doc:`04_least_action`). At D = 5·10⁻⁵ the ratio ΔU/D is 1.6, and the state is left
 # after a few relaxation times. A finding states that it is not metastable at this
-# intensity; the mean time is well defined, but exit times follow no exponential law. At
-# D = 2·10⁻⁵ the mean time is nine times as long.
+# intensity. The mean time is well defined, but exit times follow no exponential law. At
+# D = 2·10⁻⁵ the mean time is about nine times as long.
 
 osc = vk.load_scene("hertz-0.570")
 structure = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)
