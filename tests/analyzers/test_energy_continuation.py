@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.analyzers import energy_run
 from vibrokit.errors import ParameterError, ResultFileError, SceneError, StructureError
 from vibrokit.results.codes import Code
@@ -61,7 +62,7 @@ def test_the_cheapest_exit_changes_where_two_stops_are_equally_far():
     assert finding.values["value"] == change.value
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_path_that_ends_is_said_to_end():
     """A constant force beyond 2/√27 leaves one well of −x²/2 + x⁴/4."""
     osc = WELLS.replace(excitations=(vk.Constant(0.3),))
@@ -191,7 +192,7 @@ def test_a_time_limit_before_the_first_path_leaves_an_incomplete_record(tmp_path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stopped_in", ["attractors", "action plot"])
+@pytest.mark.parametrize("stopped_in", [long("attractors"), "action plot"])
 def test_an_interrupt_in_a_search_ends_the_work(stopped_in):
     """What is called keeps what it has and returns; nothing more may be searched for or followed after that."""
     begun = []

@@ -66,7 +66,7 @@ def test_any_executor_gives_the_same_bits(pool):
     assert np.isfinite(alone.log_density).any()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_any_time_and_any_phase():
     # a start at a phase is the start at the section of the same scene with its forcing moved
     forced = {"damping_ratio": 0.2, "noise": vk.WhiteNoise(intensity=0.01)}

@@ -43,7 +43,7 @@ def averaged(mu, alpha, beta):
 
 
 @pytest.mark.parametrize("nodes", [60, long(90)])
-@pytest.mark.parametrize(("source", "right"), [("small-cycle", 0.0523), ("large-cycle", 0.037736)])
+@pytest.mark.parametrize(("source", "right"), [long("small-cycle", 0.0523), ("large-cycle", 0.037736)])
 def test_the_interval_contains_the_energy_of_a_weakly_damped_cycle(source, right, nodes):
     """The right values are polished ones; averaging gives 0.0524 and 0.0378."""
     energies = averaged(0.1, 0.144, 0.005)
@@ -90,6 +90,7 @@ def test_a_search_that_is_stopped_has_an_interval_that_contains_the_energy():
             assert energy.upper >= 0.037736 * 0.999
 
 
+@pytest.mark.long
 def test_the_quadratic_form_across_a_cycle():
     """Near the large cycle Ψ'' = −2μ (1 − 3A²/4 + 5αA⁴/8 − 35βA⁶/64) and Ψ = ½ Ψ'' (A − A₀)²."""
     osc, structure = birhythmic(0.02)
@@ -116,7 +117,7 @@ def wells(friction):
     return osc, vk.find_structure(osc, cells=(60, 60), starts=(8, 8), manifolds=False)
 
 
-@pytest.mark.parametrize(("friction", "right"), [(0.0, 0.5), long(0.1, 0.47525), (0.3, 0.4280)])
+@pytest.mark.parametrize(("friction", "right"), [long(0.0, 0.5), long(0.1, 0.47525), (0.3, 0.4280)])
 @pytest.mark.parametrize("source", [0, 1])
 def test_graph_and_action_plot_alone_agree_within_their_errors(friction, right, source):
     """0.5 by detailed balance; the others by a boundary value problem of Hamilton's equations, ±3e-4."""

@@ -186,7 +186,7 @@ def test_all_work_belongs_to_a_named_stage(structure):
     assert rest < 0.05 * sum(seconds.values())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_graph_is_refined_as_far_as_the_accuracy_asks(structure):
     graph = vk.GraphSearch(nodes=(200, 200), steps_per_period=8)
 

@@ -41,8 +41,8 @@ def both(kind):
     return LEAST.run(*wells(kind))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [long("forced"), "unforced", long("third harmonic")])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["forced", "unforced", "third harmonic"])
 def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     osc, structure = wells(kind)
     first, second = both(kind).energies
@@ -58,7 +58,7 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["forced", "unforced"])
+@pytest.mark.parametrize("kind", ["forced", long("unforced")])
 def test_the_second_well_has_the_mirror_image_of_the_quasi_potential(kind):
     """Around the second well it is what the graph finds there."""
     osc, structure = wells(kind)

@@ -138,7 +138,7 @@ def test_with_forcing_too():
     assert jumps(energy.path).max() <= 5e-3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_graph_goes_through_other_basins():
     """The grids for a target that no saddle leads to cover the basins on the way; each climb is known exactly."""
     problem = problem_of(OVERDAMPED)

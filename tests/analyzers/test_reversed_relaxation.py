@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.analyzers.problem import ExitProblem
@@ -50,7 +51,7 @@ def test_none_with_forcing():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("damping", "energy"), [(1e-3, 1e-3), (1e-2, 1e-2)])
+@pytest.mark.parametrize(("damping", "energy"), [long(1e-3, 1e-3), (1e-2, 1e-2)])
 def test_it_is_certified_without_a_search(damping, energy):
     """A graph too coarse to find anything, and no shooting."""
     osc = scene(damping)
@@ -62,7 +63,7 @@ def test_it_is_certified_without_a_search(damping, energy):
     assert abs(found.value - energy) <= found.numerical_error + 1e-9 * energy
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_without_detailed_balance_it_is_a_guess():
     """Damping that grows with x²: the polished path costs another action than the guess, and the search agrees."""
     osc = scene(0.05, spring=vk.CustomSpring("-x + x**3 + c*x**2*v", c=0.3))

@@ -107,7 +107,7 @@ def test_intensities_that_cannot_be_resolved_cost_no_others(structure):
     assert energy.lower <= 0.05 <= energy.upper  # 4ζω_n times the barrier of 1/4
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intensities_that_need_too_much_memory_cost_no_others(structure):
     found = vk.SGCM(source=0, intensities=(2e-2, 1.5e-2, 2e-5), steps=8, max_memory_gib=0.005).run(WELL, structure)
     assert [rate.intensity for rate in found.rates] == [2e-2, 1.5e-2]

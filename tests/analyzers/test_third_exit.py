@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +24,7 @@ class LeaveBox(vk.LeaveRegion):
         return np.array([[-self.x, self.x], [-self.v, self.v]])
 
 
-BOXES = [LeaveBox(x=0.5), LeaveBox(v=0.5), LeaveBox(x=0.5, v=0.3), LeaveBox(x=0.3, v=0.6)]
+BOXES = [LeaveBox(x=0.5), long(LeaveBox(v=0.5)), long(LeaveBox(x=0.5, v=0.3)), LeaveBox(x=0.3, v=0.6)]
 
 
 def exact(box):

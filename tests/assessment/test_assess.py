@@ -130,8 +130,8 @@ def test_an_assessment_that_was_stopped_goes_on(calls, tmp_path, number):
     assert which(ran) == [PATHS, *BOTH]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [1, long(5)])
+@pytest.mark.long
+@pytest.mark.parametrize("number", [1, 5])
 def test_an_incomplete_result_is_no_stop(calls, tmp_path, number):
     ran, stop = calls
     stop.append(-number)

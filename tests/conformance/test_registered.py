@@ -21,6 +21,18 @@ from vibrokit.results.rated import RatedResult
 
 pytestmark = pytest.mark.slow
 
+LONG = ("pulse-train-motion", "pulse-train-period", "filtered-compiled")
+
+
+def marks(part, name, check):
+    """A second process takes seconds to import: of one contact law and one noise model it is no long test.
+
+    Parts of plug-ins take longer than a group may; each plug-in's own tests check one.
+    """
+    brief = name in ("hertz", "white") if check == "another process" else f"{name}-{check}" not in LONG
+    return () if part.is_ours() and brief else pytest.mark.long
+
+
 KINDS = [
     (Group.CONTACT_LAWS, ContactLaw, testing.contact_law_checks),
     (Group.SPRINGS, Spring, testing.spring_checks),
@@ -29,12 +41,11 @@ KINDS = [
     (Group.NOISE_MODELS, NoiseModel, testing.noise_model_checks),
 ]
 REGISTERED = [
-    pytest.param(make, id=f"{group.noun}-{name}-{check}", marks=() if part.is_ours() else pytest.mark.long)
+    pytest.param(make, id=f"{group.noun}-{name}-{check}", marks=marks(part, name, check))
     for group, kind, checks in KINDS
     for name, part in load_all(group, kind).items()
     for check, make in checks(part, rng=1)
 ]
-"""Parts of plug-ins take longer than a group may; each plug-in's own tests check one."""
 
 
 @pytest.mark.parametrize("make", REGISTERED)
@@ -85,6 +96,7 @@ def test_examples(checks, part):
             make()
 
 
+@pytest.mark.long
 def test_report_reads_as_a_table():
     report = testing.check("linear")  # a law and a spring
     assert report.passed
@@ -107,14 +119,16 @@ class Pulse(vk.Excitation):
         return math.inf
 
 
+@pytest.mark.long
 def test_excitation_that_never_repeats():
     testing.check_excitation(Pulse)
 
 
+@pytest.mark.long
 def test_excitation_that_jumps():
     testing.check_excitation(SquareWave)
 
 
-@pytest.mark.parametrize("noise", [Coloured, NarrowBand])
+@pytest.mark.parametrize("noise", [Coloured, long(NarrowBand)])
 def test_noise_with_states_of_its_own(noise):
     testing.check_noise_model(noise)

@@ -103,6 +103,7 @@ def test_the_first_contact_of_an_orbit_near_grazing(scene):
     check_certified(energy, scene.contact)
 
 
+@pytest.mark.long
 def test_the_graph_of_an_overdamped_well_holds_the_exact_energy_in_its_bounds():
     (scene,) = (scene for scene in damped_wells() if scene.name == "double well, zeta=2")
     structure = structure_of(scene)
@@ -123,6 +124,7 @@ def test_steps_are_fine_enough_for_the_stability_of_an_orbit_at_a_stiff_stop():
     assert sizes == pytest.approx(np.sort(np.abs(hammering.multipliers)), abs=1e-3)
 
 
+@pytest.mark.long
 def test_a_path_with_many_short_impacts_is_certified():
     """Hammering between two stops: a contact lasts a fifteenth of the piece between two nodes of the path.
 

@@ -5,6 +5,7 @@ import pytest
 
 import vibrokit as vk
 from tests.extremes.exact import exact_period, rounding_after
+from tests.layers import long
 from tests.scenes import double_well, scene
 from vibrokit.structure.linear_map import gaussian_map
 
@@ -16,8 +17,8 @@ STEPPERS = [vk.FreeFlight(tolerance=1e-12), vk.Order8(tolerance=1e-12)]
 
 @pytest.mark.parametrize("stepper", STEPPERS, ids=lambda s: s.name)
 @pytest.mark.parametrize("law", ["hertz", "linear"])
-@pytest.mark.parametrize("stiffness", [1.0, 1e2, 1e4, 1e6, 1e8, 1e10, 1e12])
-@pytest.mark.parametrize("excess", [1.0, 1e-2, 1e-4, 1e-6, 1e-8], ids=lambda e: f"excess{e:g}")
+@pytest.mark.parametrize("stiffness", [1.0, *map(long, (1e2, 1e4)), 1e6, *map(long, (1e8, 1e10)), 1e12])
+@pytest.mark.parametrize("excess", [1.0, long(1e-2), 1e-4, long(1e-6), 1e-8], ids=lambda e: f"excess{e:g}")
 def test_back_after_whole_periods(stepper, law, stiffness, excess):
     check_periods(stepper, law, stiffness, excess)
 

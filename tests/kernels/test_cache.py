@@ -75,7 +75,7 @@ def test_another_process_needs_no_sympy_compiles_nothing_and_finds_the_same_bits
     assert files(cache) == kept
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_law_typed_at_a_prompt(cache):
     code = """
 import vibrokit as vk

@@ -129,7 +129,7 @@ def test_ctrl_c_is_seen_during_a_call(bouncing):
     assert time.perf_counter() - began < LEAST
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_time_limit_of_a_continuation_holds_on_a_stiff_table(bouncing):
     """A public report's ball on a table with k = 1e8."""
     found = continuation(bouncing, "excitations.1.amplitude", [1.2, 1.3], time_limit=5.0)

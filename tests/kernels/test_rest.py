@@ -57,7 +57,7 @@ def test_rebounds_fall_and_end(height):
     np.testing.assert_allclose(path.x[path.t > 1.02 * end], -GRAVITY / 1e8, rtol=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_structure_has_one_attractor_and_loses_no_start():
     structure = vk.find_structure(ball(1e6, 0.074355, "left"), rng=0)
     (rest,) = structure.attractors

@@ -28,8 +28,8 @@ def test_friction_that_nearly_jumps_is_named(formula):
     assert all(map(math.isfinite, caught.value.state))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("stiffness", "damping", "tolerance"), [long(1e8, 5105.0, 1e-12), (1e9, 2e4, 1e-11)])
+@pytest.mark.long
+@pytest.mark.parametrize(("stiffness", "damping", "tolerance"), [(1e8, 5105.0, 1e-12), (1e9, 2e4, 1e-11)])
 def test_rest_on_a_stiff_table_is_followed(stiffness, damping, tolerance):
     """A mass that rests on a shaken table moves as a linear oscillator; rounding where v = 0 leaves no step short."""
     law = vk.CustomLaw("k*depth + c*rate", k=stiffness, c=damping)

@@ -8,6 +8,7 @@ import pytest
 import scipy.signal
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.errors import ParameterError
 
 FINE = 8  # steps of the simulation in a sample, so that the instrument's filter has something to keep out
@@ -58,7 +59,7 @@ def test_a_record_gives_the_parameters_within_their_errors(case):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [COLOURED, NARROW, WHITE], ids=lambda case: type(case[0]).__name__)
+@pytest.mark.parametrize("case", [COLOURED, long(NARROW), WHITE], ids=lambda case: type(case[0]).__name__)
 def test_stated_errors_cover_the_scatter(case):
     """Of 40 records: 68 % and 95 % lie within one and two errors if these are right; two deviations of 40 are less."""
     off = np.abs(deviations(case, 40))

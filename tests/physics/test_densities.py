@@ -17,6 +17,7 @@ from vibrokit.symbolic.flow_kind import Flow
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.long
 def test_density_of_a_forced_linear_scene_is_gaussian_to_a_depth_of_40():
     damping, intensity = 0.05, 1e-3
     variance = intensity / (4 * damping)

@@ -32,7 +32,7 @@ def one_sided(length, side):
     ("length", "side", "depths"),
     [
         long(1.0, "right", (4, 8, 12, 16, 20)),
-        (1.0, "right", (6, 20)),
+        long(1.0, "right", (6, 20)),
         (1e-3, "left", (6, 20)),
     ],
 )
@@ -59,7 +59,8 @@ def test_a_small_state_beside_a_wide_one_is_left_as_in_simulations(length, side)
         assert rate.log_error < 0.6
 
 
-@pytest.mark.parametrize(("damping", "depth"), [(0.1, 20), long(0.5, 30)])
+@pytest.mark.long
+@pytest.mark.parametrize(("damping", "depth"), [(0.1, 20), (0.5, 30)])
 def test_rates_are_exact_wherever_states_are_committed(damping, depth, monkeypatch):
     """Also nearer to the basin's edge, farther from it, and in the core only: the exact rate is in the stated error."""
     osc = double_well(damping_ratio=damping, noise=vk.WhiteNoise(damping))

@@ -3,7 +3,7 @@
 import pytest
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 
 BARRIER = 0.25  # of −x²/2 + x⁴/4
 
@@ -16,7 +16,7 @@ def double_well(damping):
     return osc, structure
 
 
-@pytest.mark.parametrize("damping", [slow(0.02), 0.05, 0.3])
+@pytest.mark.parametrize("damping", [long(0.02), 0.05, 0.3])
 def test_ring_on_the_double_well(damping):
     osc, structure = double_well(damping)
     result = vk.ActionPlot(radius=1e-6, points=4000).run(osc, structure)
@@ -28,7 +28,7 @@ def test_ring_on_the_double_well(damping):
         assert energy.target == 1 - energy.source
 
 
-@pytest.mark.parametrize("damping", [slow(0.01), 0.1, 0.5, 1.0])
+@pytest.mark.parametrize("damping", [long(0.01), 0.1, 0.5, 1.0])
 def test_whole_domain_on_the_double_well(damping):
     """Starts are at 1 % of the exit distance, so the quadratic form costs 1e-6; refinement ends at 1e-4 a round."""
     osc, structure = double_well(damping)
@@ -41,7 +41,7 @@ def test_whole_domain_on_the_double_well(damping):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damping", [1.5, 2.0])
+@pytest.mark.parametrize("damping", [long(1.5), 2.0])
 def test_far_overdamped_the_numerical_error_is_large(damping):
     """Paths cannot be shot through the funnel to the saddle in double precision; the exit found is a costly one."""
     osc, structure = double_well(damping)

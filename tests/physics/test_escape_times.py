@@ -12,7 +12,6 @@ import pytest
 from scipy.integrate import quad
 
 import vibrokit as vk
-from tests.layers import long
 from vibrokit.results.basins import ESCAPED
 
 QUICK = {"cells": (60, 60), "starts": (8, 8), "manifolds": False}
@@ -60,8 +59,8 @@ def agree(found, right, deviations=3.0, formula=0.0):
     return abs(math.log(time / right)) <= deviations * error + formula
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sign", [1, long(-1)])
+@pytest.mark.long
+@pytest.mark.parametrize("sign", [1, -1])
 def test_escape_from_the_only_well_is_that_of_kramers(sign):
     osc = softening(0.1, 6.0, sign)
     right = kramers_time(0.2, 1.0, 1.0, 1 / 6, 1 / 36, 0.2 * 6 / 5)

@@ -9,7 +9,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
-from tests.layers import long
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -81,8 +80,8 @@ def reference_with_momenta():
     return spread(starts_with_momenta(), 2)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("stepper", [long(FINEST[0]), FINEST[1]], ids=lambda s: s.name)
+@pytest.mark.long
+@pytest.mark.parametrize("stepper", FINEST, ids=lambda s: s.name)
 def test_state_over_ten_periods(stepper, long_reference):
     osc = vk.load_scene("hertz-0.570")
     ends = osc.section_map(starts()[:, :2], PERIODS, stepper=stepper)

@@ -66,12 +66,12 @@ def test_double_well_from_both_sides(damping):
 SEARCHES = {"graph": {"shooting": None}, "shooting": {"graph": None}, "both": {}}
 
 
-@pytest.mark.parametrize("search", SEARCHES.values(), ids=SEARCHES)
+@pytest.mark.parametrize("search", [long("graph"), long("shooting"), "both"])
 def test_each_search_by_its_defaults(search):
     """Noise that changes by rounding errors, since detailed balance makes the searches needless."""
     osc, structure = double_well(0.1)
     osc = dataclasses.replace(osc, noise=vk.StateDependentNoise(1e-4, "1 + c*x**2", c=1e-13))
-    result = vk.LeastAction(source=1, **search).run(osc, structure)
+    result = vk.LeastAction(source=1, **SEARCHES[search]).run(osc, structure)
     check_double_well(result, 0.1, (1,))
     (energy,) = result.energies
     if "graph" in search:
@@ -139,7 +139,7 @@ MISSED = pytest.param(
     (2.0,), marks=pytest.mark.xfail(strict=True, reason="shots at strong damping reach one stop only")
 )
 TOUCHES = [
-    (0.1,), (1.0,), MISSED, (0.05, 1.0, 0.1, 0.8), (0.1, 1.0, 0.2, 0.4, -0.1),
+    (0.1,), (1.0,), MISSED, long((0.05, 1.0, 0.1, 0.8)), long((0.1, 1.0, 0.2, 0.4, -0.1)),
     long((0.01,)), long((0.5,)), long((0.05, 1.7)), long((0.2, 1.0, 0.1, 1.3)),
 ]  # fmt: skip
 
@@ -152,7 +152,7 @@ def test_first_touch_of_either_stop(scene):
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-@pytest.mark.parametrize("scene", [(0.1, 1.0, 0.2, 0.4, -0.1), (1.0, 1.3)], ids=str)
+@pytest.mark.parametrize("scene", [(0.1, 1.0, 0.2, 0.4, -0.1), long((1.0, 1.3))], ids=str)
 def test_first_touch_by_side(scene, side):
     """At rest at the stop, at the time at which the forced motion comes nearest to it."""
     energy = touched(scene, side, graph=None, shooting=QUICK)
@@ -167,7 +167,7 @@ def test_first_touch_by_side(scene, side):
 @pytest.mark.parametrize(
     "search", [{"shooting": None, "graph": vk.GraphSearch(nodes=(80, 80))}, {"graph": None}], ids=str
 )
-@pytest.mark.parametrize("damping", [0.05, 0.5])
+@pytest.mark.parametrize("damping", [long(0.05), 0.5])
 def test_first_touch_by_each_search_alone(damping, search):
     energy = touched((damping,), "right", **search)
     assert energy.value == pytest.approx(least_touches(damping)["right"], rel=1e-8)
@@ -280,7 +280,8 @@ def test_the_graph_resolves_small_islands_around_an_orbit_of_period_3():
     assert energy.numerical_error < 0.1 * energy.value
 
 
-@pytest.mark.parametrize("source", [0, long(1)])
+@pytest.mark.long
+@pytest.mark.parametrize("source", [0, 1])
 def test_minimised_once_more_it_stays(polished, source):
     """∫ ½ (x″ + 2ζx′ + …)² dt brought to its minimum, with a grid and ends of its own, from the polished path."""
     energy, model = polished.energies[source], reference.paper(0.570)

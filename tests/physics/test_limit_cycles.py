@@ -72,7 +72,7 @@ def polished(source):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("source", [0, 1])
+@pytest.mark.parametrize("source", [0, long(1)])
 def test_path_between_rest_and_cycle_is_certified(source):
     branch = polished(source)
     assert branch.certificate is not None
@@ -91,8 +91,8 @@ def test_sensitivities_are_the_derivatives_of_the_closed_form():
         assert branch.sensitivity[f"spring.{name}"] == pytest.approx(value, rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("source", [0, long(1)])
+@pytest.mark.long
+@pytest.mark.parametrize("source", [0, 1])
 def test_least_action_certifies_both(source):
     osc, structure = self_excited()
     (energy,) = vk.LeastAction(source=source, **QUICK).run(osc, structure).energies

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
+from tests.layers import long
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def test_two_states_and_one_saddle_at_0570(paper):
     assert structure.survival == ()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_third_attractor_at_0525(slower):
     _, structure = slower
     clear, hammering, wandering = structure.attractors
@@ -69,7 +70,7 @@ def test_a_third_attractor_at_0525(slower):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["paper", "slower"])
+@pytest.mark.parametrize("name", ["paper", long("slower")])
 def test_orbits_are_those_that_scipy_finds(request, name):
     osc, structure = request.getfixturevalue(name)
     orbits = [*(a for a in structure.attractors if a.repeats), *(s for s in structure.saddles if s.kind == "saddle")]

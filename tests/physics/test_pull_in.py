@@ -142,7 +142,7 @@ def test_a_switch_latches_before_the_pole():
     assert result.energy(1, "escape").value == pytest.approx(through, rel=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_comb_between_two_poles():
     a, damping = 0.05, 0.1
     osc = scene(
@@ -232,9 +232,9 @@ def settled(spring):
     [
         ("x - b/(1-x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2, (-math.inf, 1.0)),
         slow("x + b/(1+x)**2", {"b": 0.05}, lambda x: x + 0.05 / (1 + x) ** 2, (-1.0, math.inf)),
-        slow("x - b/(1-x)**2 + b/(1+x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2 + 0.05 / (1 + x) ** 2,
+        long("x - b/(1-x)**2 + b/(1+x)**2", {"b": 0.05}, lambda x: x - 0.05 / (1 - x) ** 2 + 0.05 / (1 + x) ** 2,
             (-1.0, 1.0)),
-        slow("x - b/sqrt(1-x)", {"b": 0.2}, lambda x: x - 0.2 / math.sqrt(1 - x), (-math.inf, 1.0)),
+        long("x - b/sqrt(1-x)", {"b": 0.2}, lambda x: x - 0.2 / math.sqrt(1 - x), (-math.inf, 1.0)),
     ],
 )  # fmt: skip
 def test_a_weak_force_shows_nothing_behind_a_border(formula, values, spring, borders):

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
+from tests.layers import long
 from vibrokit.errors import DerivationError, StepperError
 from vibrokit.kernels.choice import LOCATED, ensemble_stepper
 from vibrokit.structure.linear_map import hamiltonian_map, linear_map
@@ -63,10 +64,10 @@ def contact(push):
     ("osc", "force", "place"),
     [
         (stopped("k*depth**n", k=5.0, n=0.6), contact(lambda d, r: 5 * d**0.6), 0.5),
-        (stopped("5*depth**0.5"), contact(lambda d, r: 5 * math.sqrt(d)), 0.5),
-        (stopped("50*depth**0.95"), contact(lambda d, r: 50 * d**0.95), 0.5),
-        (stopped("5*log(1 + depth)**0.5"), contact(lambda d, r: 5 * math.sqrt(math.log1p(d))), 0.5),
-        (stopped("5*depth**0.6*(1 + 0.3*rate)"), contact(lambda d, r: 5 * d**0.6 * (1 + 0.3 * r)), 0.5),
+        long(stopped("5*depth**0.5"), contact(lambda d, r: 5 * math.sqrt(d)), 0.5),
+        long(stopped("50*depth**0.95"), contact(lambda d, r: 50 * d**0.95), 0.5),
+        long(stopped("5*log(1 + depth)**0.5"), contact(lambda d, r: 5 * math.sqrt(math.log1p(d))), 0.5),
+        long(stopped("5*depth**0.6*(1 + 0.3*rate)"), contact(lambda d, r: 5 * d**0.6 * (1 + 0.3 * r)), 0.5),
         (stopped("5*depth**0.25"), contact(lambda d, r: 5 * d**0.25), 0.5),
         (
             stopped("k*depth**1.5 + c*depth**0.25*rate", k=50.0, c=1.4),
@@ -78,7 +79,7 @@ def contact(push):
             lambda x, v, side: side * math.sqrt(abs(x)),
             0.0,
         ),
-        (
+        long(
             forced(spring=vk.CustomSpring("x + 0.5*sqrt(abs(x - 0.2))")),
             lambda x, v, side: x + 0.5 * math.sqrt(abs(x - 0.2)),
             0.2,

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
 import vibrokit as vk
+from tests.layers import long
 from tests.scenes import double_well, scene
 from vibrokit.kernels.choice import single_stepper
 from vibrokit.structure.attractors.describe import describe_orbit
@@ -122,8 +123,8 @@ def test_a_preloaded_orbit_grazes_where_its_amplitude_is_the_static_depth(stiffn
     ("law", "force"),
     [
         (vk.Hertz(20.0), lambda depth: 20 * depth**1.5),
-        (vk.CustomLaw("k*depth**3", k=5.0), lambda depth: 5 * depth**3),
-        (vk.CustomLaw("k*depth**n", k=5.0, n=0.5), lambda depth: 5 * math.sqrt(depth)),
+        long(vk.CustomLaw("k*depth**3", k=5.0), lambda depth: 5 * depth**3),
+        long(vk.CustomLaw("k*depth**n", k=5.0, n=0.5), lambda depth: 5 * math.sqrt(depth)),
     ],
 )
 def test_a_preloaded_orbit_grazes_where_an_independent_integration_touches_zero(law, force):

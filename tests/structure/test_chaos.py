@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import long
 from tests.scenes import Coloured, scene
 from vibrokit.results.basins import ESCAPED
 from vibrokit.structure.attractors.wandering import (
@@ -230,7 +231,7 @@ def hammered():
     return vk.load_scene("hertz-0.525"), starts(80, [0.05, -0.12], [0.2, 0.05])
 
 
-@pytest.mark.parametrize("steps", [512, 1024])
+@pytest.mark.parametrize("steps", [long(512), 1024])
 def test_the_chaotic_attractor_lasts(hammered, steps):
     osc, states = hammered
     stepper = vk.RK4(steps)
@@ -252,6 +253,7 @@ def test_too_coarse_a_stepper_loses_it(hammered):
     assert survival.survivors == 0
 
 
+@pytest.mark.long
 def test_exact_flight_and_fixed_steps_agree_on_its_exponent(hammered):
     osc, states = hammered
     stepper = vk.RK4(2048)

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
+from tests.layers import long
 from tests.scenes import scene
 from tests.structure.stable import attractor
 from vibrokit.results.basins import AT_COPY, ESCAPED
@@ -114,7 +115,7 @@ def test_without_running_states_copies_are_escape():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("push", "tone", "region"),
-    [(0.5, 0.0, None), (-0.4, 0.0, ((-math.pi, math.pi), (-6.0, 6.0))), (0.0, 0.3, None)],
+    [(0.5, 0.0, None), (-0.4, 0.0, ((-math.pi, math.pi), (-6.0, 6.0))), long(0.0, 0.3, None)],
     ids=["default region", "one turn", "forced"],
 )
 def test_motion_that_ends_at_a_copy_has_not_escaped(push, tone, region, tmp_path):
@@ -153,7 +154,7 @@ def test_copies_in_a_wide_region_are_told_apart():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turns", [-1, 0.5])
+@pytest.mark.parametrize("turns", [long(-1), 0.5])
 def test_a_libration_is_listed_in_the_turn_of_its_region(turns):
     """At x = −2.407661 by an independent integration, or whole turns away."""
     low = 2 * math.pi * turns - math.pi

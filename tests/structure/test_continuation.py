@@ -43,6 +43,7 @@ def same(first, second):
     return bool(first == second)
 
 
+@pytest.mark.long
 def test_branches_keep_their_identity(paper):
     np.testing.assert_array_equal(paper.values, [0.565, 0.58, 0.595, 0.61])
     assert paper.complete
@@ -62,6 +63,7 @@ def test_branches_keep_their_identity(paper):
     assert len(paper.plot_fractions().areas) == len(paper.branches)
 
 
+@pytest.mark.long
 def test_basin_fractions_are_shares_of_one_region(paper):
     shares, errors = paper.fractions()
     np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=0.02)  # but for cells on a boundary that did not settle
@@ -123,6 +125,7 @@ def test_wells_meet_in_a_pitchfork():
     assert [len(at.attractors) for at in result.states] == [2, 2, 1]
 
 
+@pytest.mark.long
 def test_processes_give_the_same_to_the_last_bit():
     osc, values = vk.load_scene("double-well"), [-1.0, -0.6]
     seen, serial_seen = [], []
@@ -205,6 +208,7 @@ def small():
     return osc, continuation(osc, "spring.linear", **SMALL, progress=seen.append), seen
 
 
+@pytest.mark.long
 def test_an_interrupt_at_any_moment_leaves_the_values_found(small, tmp_path):
     osc, whole, seen = small
     stages = ("values", "branches", "basin fractions")

@@ -189,7 +189,7 @@ BIRHYTHMIC = "w2*x - mu*(1 - x**2 + al*x**4 - be*x**6)*v"
     [
         # A turn takes 2π(1 + 2e-7), so that motion nearly repeats after 2π.
         long(0.002, 0.083, 0.0014, (24, 24)),
-        (0.002, 0.144, 0.005, (10, 10)),
+        long(0.002, 0.144, 0.005, (10, 10)),
         (0.0005, 0.144, 0.005, (10, 10)),  # the cycle between these has the multiplier 1.0013
     ],
 )

@@ -76,7 +76,7 @@ def test_the_linear_response_to_all_tones_is_a_start(rest):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("unit", [1.0, 1e-3])
+@pytest.mark.parametrize("unit", [long(1.0), 1e-3])
 def test_the_softening_beam_has_two_orbits_and_escape(unit):
     """Shooting: the large orbit of amplitude 0.898, its saddle, and the tops of the potential at ±1.443."""
     found = vk.find_structure(beam(unit=unit), cells=(100, 100), manifolds=False)
@@ -91,7 +91,7 @@ def test_the_softening_beam_has_two_orbits_and_escape(unit):
     assert found.region.x[0] / unit < -1.443 < 1.443 < found.region.x[1] / unit
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_both_cycles_of_a_birhythmic_oscillator_are_in_the_default_region():
     """Averaging: 2.639 and 4.840 stable, 3.962 unstable (Yamapi, Filatrella et al., doi 10.1063/1.4766678)."""
     force = "x - mu*(1 - x**2 + al*x**4 - be*x**6)*v"
@@ -103,7 +103,7 @@ def test_both_cycles_of_a_birhythmic_oscillator_are_in_the_default_region():
     assert len(found.saddles[0].orbit) > 100
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_quiet_state_of_a_tube_is_found():
     """At 58 Hz its amplitude is 0.2450 mm in a gap of 0.25 mm, and its basin is smaller than a cell of most grids."""
     found = vk.find_structure(tube(), cells=(50, 50), saddles=False)

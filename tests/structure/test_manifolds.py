@@ -204,7 +204,7 @@ def test_a_finer_curve_lies_within_what_the_coarser_one_claims():
         assert distances(middles, other.curve).max() < (0.01 * 0.2 + 0.005 * 0.1) / 8 * 6.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_another_stepper_finds_the_same_curve():
     osc, point, _, branches = paper()
     exact = list(grow_manifolds(osc, 0, saddle(point), region=SQUARE, stepper=vk.FreeFlight(1e-8), arc_length=3.0))

@@ -96,7 +96,7 @@ def test_a_libration_is_recorded_where_its_points_are():
 @pytest.mark.parametrize(
     ("k", "a", "n", "push"),
     [
-        (1.0, 8.0, 3.0, 0.0),  # the outermost wells are 0.13 wide
+        long(1.0, 8.0, 3.0, 0.0),  # the outermost wells are 0.13 wide
         long(1e3, 8.0, 3e3, 0.0),
         (1.0, 12.0, 4.0, 1.0),
     ],
@@ -139,7 +139,8 @@ def relaxing(name, friction=0.0):
     [
         *((name, None) for name in ("double well", "escape", "pendulum", "pressed")),
         ("double well", 2),
-        *map(slow, ("tilted", "escape", "pressed"), (None, 2, 2)),
+        slow("escape", 2),
+        *map(long, ("tilted", "pressed"), (None, 2)),
         *(long(name, None) for name in ("three wells", "overdamped", "both sides", "one well")),
     ],
 )

@@ -285,7 +285,7 @@ def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
         assert len(found) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_branches_are_followed_from_beyond_the_error_of_the_stepper():
     """Nearer to the saddle of period 6, fixed steps across this stop have a stable orbit that the scene has not."""
     osc = scene(vk.Barrier(vk.Linear(1000.0), 0.2, "right"), damping_ratio=0.03, excitations=(vk.Harmonic(0.4, 2.6),))

@@ -6,7 +6,7 @@ import pytest
 import sympy
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 from tests.scenes import scene
 from vibrokit.errors import DerivationError
 
@@ -34,7 +34,7 @@ JUMPING_IN_X = (
 CONTINUOUS = [
     "x + f*v*abs(v)", "x + f*tanh(v/1e-3)", "x + f*v*sign(v)", "x + f*max(v, 0)", "x + f*abs(v - x)",
     "x + f*(v - x)*sign(v - x)", "x + f*v/(1 + v**2)", "x + f*v/sqrt(v**2 + 1e-6)", "x + f*sqrt(abs(v))*sign(v)",
-    "x + f*abs(x)*sign(x)", "x + f*abs(x/p)**p*sign(x/p)", "x + f*max(min(x, 1), -1)", slow("x + f*atan(tan(v/9)**2)"),
+    "x + f*abs(x)*sign(x)", "x + f*abs(x/p)**p*sign(x/p)", "x + f*max(min(x, 1), -1)", long("x + f*atan(tan(v/9)**2)"),
     "x + f*max(abs(v) - 1, 0)*sign(v)", "x + f*sign(v**2 + 1)", "x + f*abs(v)**p*sign(v)",
 ]  # fmt: skip
 
