@@ -131,7 +131,7 @@ def test_candidates_lead_from_the_attractor_over_the_exit_and_polish_to_the_barr
 # --- linear scene: Ψ = ½ δqᵀ Σ⁻¹ δq = 2ζω_n (ω_n² δx² + δv²), first touch 2ζω_n³ (b − max x_s)²
 
 STOP, AMPLITUDE, FREQUENCY = 1.0, 0.3, 0.57
-SCENES = [(0.05, 1.0), long(0.5, 1.0), long(2.0, 1.0), long(0.05, 1.7)]
+SCENES = [(0.05, 1.0), (0.5, 1.0), (2.0, 1.0), (0.05, 1.7)]
 
 
 @functools.cache
@@ -158,6 +158,7 @@ def least_touch(damping, natural):
     return 2 * damping * natural**3 * (STOP - abs(steady(damping, natural))) ** 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("damping", "natural"), SCENES)
 def test_the_potential_and_the_first_touch_of_the_linear_scene(damping, natural):
     """V is the quadratic form at every phase, up to half of what the touch costs."""
@@ -354,14 +355,15 @@ class Box(LeaveRegion):
 
 
 BOXES = [
-    long(Box(width=1.0)),
+    Box(width=1.0),
     Box(speed=1.2),
-    long(Box(width=1.0, speed=1.5)),  # the wall is nearer, in units of Σ
-    long(Box(width=1.5, speed=1.0)),  # the speed is
+    Box(width=1.0, speed=1.5),  # the wall is nearer, in units of Σ
+    Box(width=1.5, speed=1.0),  # the speed is
 ]
 
 
-@pytest.mark.parametrize("scene", [(0.05, 1.0), long((0.5, 1.7))])
+@pytest.mark.long
+@pytest.mark.parametrize("scene", [(0.05, 1.0), (0.5, 1.7)])
 @pytest.mark.parametrize("box", BOXES, ids=str)
 def test_a_box_costs_what_its_cheapest_face_costs(scene, box):
     """2ζω_n³ b² for |x| = b, at rest; 2ζω_n c² for |v| = c, at x = 0."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import slow
+from tests.layers import long
 from tests.scenes import Coloured, double_well, scene
 
 WELL = double_well(noise=vk.WhiteNoise(intensity=6e-3))
@@ -55,7 +55,7 @@ def test_mean_exit_time_of_the_saddle_is_half_that_of_the_attractor(result):
     assert float(times.interp(x=0.0, v=0.0)) == pytest.approx(0.5 * rate.mean_time, rel=0.02)
 
 
-@pytest.mark.parametrize("pool", [futures.ThreadPoolExecutor, slow(futures.ProcessPoolExecutor)])
+@pytest.mark.parametrize("pool", [futures.ThreadPoolExecutor, long(futures.ProcessPoolExecutor)])
 def test_any_executor_gives_the_same_bits(pool, structure):
     analyzer = vk.SGCM(source=0, intensities=(2e-2,), nodes=(48, 48), steps=8)
     alone = analyzer.run(WELL, structure)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import long
 from tests.scenes import Coloured
 from vibrokit.analyzers.paths.candidate import Candidate
 from vibrokit.analyzers.polishing.polish import polish
@@ -194,7 +193,8 @@ except here.VibrokitError as error:
 """
 
 
-@pytest.mark.parametrize("name", [long("graph"), long("plot"), "least"])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ANALYZERS)
 def test_a_structure_without_the_states_that_the_noise_has(name):
     """Noise may differ, but not the size of a state. A kernel given short states ends its process, so this is apart."""
     done = subprocess.run([sys.executable, "-c", APART.format(name=name)], capture_output=True, text=True, check=False)

@@ -6,6 +6,7 @@ import pytest
 import sympy
 
 from tests.conformance import broken, broken_forcing
+from tests.layers import long
 from vibrokit import Constant, CubicSpring, DryFriction, Harmonic, Hertz, ParametricStiffness, WhiteNoise
 from vibrokit.errors import UnknownNameError
 from vibrokit.kernels import kernel, store
@@ -123,7 +124,7 @@ def test_a_wrong_motion_is_caught(checks, part, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "column", "rates", "said"),
     [
-        ("motion", (0, 0, 0, 1), (1, 1.001), "but its formula gives"),
+        long("motion", (0, 0, 0, 1), (1, 1.001), "but its formula gives"),
         ("compiled", (0, 0, 0, 1), (1, 1.001), "the rate of w "),
         ("compiled", (0, 0, 1, 0), (1, 1), "the amplitude of NarrowBand"),
         ("diffusion", (0, 1, 0, 0), (1, 1), "the square of its amplitude"),

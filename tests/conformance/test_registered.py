@@ -129,6 +129,7 @@ def test_excitation_that_jumps():
     testing.check_excitation(SquareWave)
 
 
-@pytest.mark.parametrize("noise", [Coloured, long(NarrowBand)])
+@pytest.mark.long
+@pytest.mark.parametrize("noise", [Coloured, NarrowBand])
 def test_noise_with_states_of_its_own(noise):
     testing.check_noise_model(noise)

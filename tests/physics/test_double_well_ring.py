@@ -40,8 +40,8 @@ def test_whole_domain_on_the_double_well(damping):
     assert energy.value - energy.numerical_error <= exact <= energy.upper
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("damping", [long(1.5), 2.0])
+@pytest.mark.long
+@pytest.mark.parametrize("damping", [1.5, 2.0])
 def test_far_overdamped_the_numerical_error_is_large(damping):
     """Paths cannot be shot through the funnel to the saddle in double precision; the exit found is a costly one."""
     osc, structure = double_well(damping)

@@ -151,7 +151,7 @@ def test_first_touch_of_either_stop(scene):
     check_certificate(energy)
 
 
-@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("side", [long("right"), "left"])
 @pytest.mark.parametrize("scene", [(0.1, 1.0, 0.2, 0.4, -0.1), long((1.0, 1.3))], ids=str)
 def test_first_touch_by_side(scene, side):
     """At rest at the stop, at the time at which the forced motion comes nearest to it."""

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 import vibrokit as vk
-from tests.layers import long
 from tests.plugins.metadata import write_metadata
 from vibrokit.cli import main, new_plugin
 from vibrokit.cli.new_plugin import KINDS, plugin_files, plugin_names
@@ -40,8 +39,8 @@ def run(*words, folder):
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [kind if kind == "excitation" else long(kind) for kind in KINDS])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_passes_its_tests_and_the_checks(kind, folder, monkeypatch, capsys):
     assert main(["new-plugin", NAMES[kind], "--kind", kind]) == 0
     assert f"vibrokit_my_{kind.replace('-', '_')}" in capsys.readouterr().out

@@ -64,7 +64,7 @@ def found(tmp_path_factory):
         return do(STEPS, tmp_path_factory.mktemp("whole"))["double-well"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_work_that_was_stopped_goes_on_with_the_same_bits(found, tmp_path):
     assert list(found) == ["structure", "density"]
     with working():

@@ -160,7 +160,7 @@ def test_the_duffing_oscillator_has_one_boundary_saddle():
     check_against_scipy(osc, found[0], lambda t, x, v: 0.4 * np.cos(1.4 * t) - 0.1 * v - x - 0.3 * x**3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_weakly_damped_boundary_takes_long_to_reach_its_saddle():
     # An island of period 3 beside the small oscillation: its boundary closes in by exp(−0.02 · 2π/3.3) in a period.
     osc = scene(spring=vk.CubicSpring(linear=1.0, cubic=0.2), excitations=(vk.Harmonic(amplitude=3.0, frequency=3.3),))
