@@ -26,7 +26,7 @@ def draw(result):
     least = [action[known][band == one].min() if (band == one).any() else np.nan for one in range(40)]
     right.stairs(np.array(least) * 1e5, edges, color="C0", label="least action of the starts in a band")
     right.axhline(CERTIFIED * 1e5, color="k", linestyle="--", linewidth=1.2, label="certified")
-    right.set(xlim=(0, 1), xlabel="radius of the start (log scale, 0 to 1)", ylabel="action, 1e-5")
+    right.set(xlim=(0, 1), ylim=(7.6, 9.6), xlabel="radius of the start (log scale, 0 to 1)", ylabel="action, 1e-5")
     right.legend(frameon=False, fontsize=9)
     return figure
 
