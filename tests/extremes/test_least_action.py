@@ -18,9 +18,9 @@ CERTIFIED = 1e-9  # residual
 SHOOTING = vk.Shooting(points=2000)
 
 
-def by_name(scenes, *names, marks=()):
+def by_name(scenes, *names):
     known = {scene.name: scene for scene in scenes}
-    return [pytest.param(known[name], id=name, marks=marks) for name in names]
+    return [pytest.param(known[name], id=name) for name in names]
 
 
 def structure_of(scene):
@@ -39,7 +39,6 @@ MILD = [
     *by_name(pressed_wells("hertz"), "pressed well, hertz, k=1, zeta=0.05"),
     *by_name(tilted_wells(), "tilted well, 0.001 from its fold"),
 ]
-LONG = pytest.mark.long
 GRAZING = by_name(first_contact("hertz"), *(f"first contact, hertz, gap {gap:g}" for gap in (1e-6, 1e-4, 1e-2)))
 STIFF = by_name(pressed_wells("hertz"), "pressed well, hertz, k=10000, zeta=0.05")
 
