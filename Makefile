@@ -1,7 +1,8 @@
 # make demo   the main job on a bundled scene, in a virtual environment of its own
 # make test   style, types and layers (alone: make lint), and the tests of seconds (alone: make test-fast)
 # make test-slow   the tests that take longer; CI runs them too
-# make test-long   slow tests that CI leaves out, since others are near to them: before a release, and after changes near to them
+# make test-long   slow tests that CI leaves out, since others are near to them or few changes can break what they show: before a
+#   release, and after changes near to them
 # make docs   the manual, in docs/_build/html: runs the tutorials and the gallery of scenes that have changed
 # make docs-check   the manual without running them; CI does it
 # make links  follow the manual's links to other sites

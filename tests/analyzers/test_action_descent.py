@@ -29,7 +29,7 @@ def descended(start, end, intervals, pieces):
     ("start", "end", "intervals"),
     [
         ((0.0, 0.55), (0.2, 0.3), 2), ((0.2, 0.5), (0.3, -0.3), 2),
-        ((0.0, 0.55), (0.3, -0.3), 3), long((0.2, 0.5), (0.0, 0.6), 3),
+        long((0.0, 0.55), (0.3, -0.3), 3), long((0.2, 0.5), (0.0, 0.6), 3),
     ],
 )  # fmt: skip
 def test_impacts_move_from_one_piece_to_another(start, end, intervals):

@@ -6,6 +6,7 @@ import pytest
 
 import vibrokit as vk
 from tests.analyzers.graph import linear
+from tests.layers import long, slow
 from tests.scenes import scene
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.analyzers.problem import ExitProblem
@@ -188,7 +189,7 @@ def test_an_interrupt_keeps_what_was_finished(paper):
     assert [energy.value for energy in estimating.energies] == [energy.value for energy in whole.energies]
 
 
-@pytest.mark.parametrize("kind", ["chaotic", "quasiperiodic", "limit cycle"])
+@pytest.mark.parametrize("kind", [slow("chaotic"), long("quasiperiodic"), "limit cycle"])
 def test_motion_without_an_orbit_to_start_from_is_a_finding(paper, kind):
     osc, structure = paper
     strange = dataclasses.replace(structure.attractors[1], kind=kind)

@@ -186,6 +186,7 @@ def test_matrix_of_rates_and_occupancies(structure):
         vk.occupancies(vk.LeastAction())
 
 
+@pytest.mark.slow
 def test_where_no_excursion_leaves_there_is_no_rate(structure, monkeypatch):
     monkeypatch.setattr(splitting, "_LEVELS", 1)  # of about 70 that are needed
     found = vk.MFET(intensities=(0.01,), source=0, splitting=True, replicas=16, escapes=0).run(WELL, structure)
@@ -376,6 +377,7 @@ def test_each_event_is_counted_apart():
     assert crossed.value > 1.2 * settled.value
 
 
+@pytest.mark.long
 def test_motion_on_a_third_attractor_goes_on():
     """Three wells: the time from side to side is that of the Markov chain with the rates between neighbours."""
     spring = vk.CustomSpring("x*(x**2 - 1)*(x**2 - 4)/8")

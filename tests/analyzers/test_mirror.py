@@ -80,6 +80,7 @@ def test_only_a_symmetric_scene_has_mirror_images(kind):
     assert labels == ([1, 0] if kind == "forced" else [None, None])
 
 
+@pytest.mark.slow
 def test_the_image_of_a_path_begins_on_the_section_half_a_period_later():
     osc, structure = wells("forced")
     left, right = structure.attractors

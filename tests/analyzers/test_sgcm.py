@@ -97,6 +97,7 @@ def test_a_grid_that_cannot_resolve_the_density_or_is_too_large_is_refused(struc
     assert not found.energies
 
 
+@pytest.mark.slow
 def test_intensities_that_cannot_be_resolved_cost_no_others(structure):
     given = (2e-2, 1.5e-2, 1.2e-2, 1e-4)
     found = vk.SGCM(source=0, intensities=given, nodes=(72, 72), steps=8).run(WELL, structure)
@@ -154,6 +155,7 @@ def test_intensities_of_an_array_are_those_of_a_tuple():
     assert vk.SGCM(intensities=np.array([1e-3, 2e-3])) == vk.SGCM(intensities=(2e-3, 1e-3))
 
 
+@pytest.mark.long
 def test_noise_is_weak_against_the_intensities_of_the_method_not_of_the_scene(structure):
     loud = WELL.replace({"noise.intensity": 0.5})
     quiet = vk.SGCM(source=0, intensities=(8e-3, 6e-3), nodes=(90, 90), steps=8).run(loud, structure)

@@ -362,6 +362,7 @@ def test_a_damaged_file_is_refused(change, tmp_path):
         vk.load_result(path)
 
 
+@pytest.mark.slow
 def test_saved_results_are_compared_without_numba(tmp_path):
     for name, made in {"a.nc": least_action(), "b.nc": rated(SGCMResult), "c.nc": rated(MFETResult)}.items():
         made.save(tmp_path / name)

@@ -36,6 +36,7 @@ def test_density_of_the_double_well_is_the_one_of_boltzmann(wells):
     assert float((found.density[0] * area).sum()) == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_barrier_at_the_saddle(wells):
     barrier = float(wells.barrier("left-rest")[0])
     assert barrier == pytest.approx(4 * 0.2 * 0.25, abs=0.02)  # within D: half of the density of the saddle has left
@@ -45,6 +46,7 @@ def test_barrier_at_the_saddle(wells):
     assert barrier - float(both.barrier(0)[0]) == pytest.approx(0.02 * math.log(2), abs=0.15 * 0.02)
 
 
+@pytest.mark.slow
 def test_all_shares_and_barriers_of_a_density_are_reconciled(wells):
     """Half of the time at each side, by rates and by the density; two runs of one method agree in all."""
     found = vk.reconcile(wells, wells)
@@ -57,6 +59,7 @@ def test_all_shares_and_barriers_of_a_density_are_reconciled(wells):
     assert all(q.lower < 4 * 0.2 * 0.25 < q.upper for q in barriers)
 
 
+@pytest.mark.slow
 def test_picture_shows_the_saddle(wells):
     artists = vk.StationaryDensity.of(wells).plot()
     assert len(artists.saddles) == len(artists.others) == 1
@@ -66,6 +69,7 @@ def test_picture_shows_the_saddle(wells):
     assert "x" in artists.ax.get_xlabel()
 
 
+@pytest.mark.slow
 def test_pictures_of_the_rates(wells):
     assert len(wells.plot_rates().points) == 2
     assert len(wells.plot_rates(source="left-rest").points) == 1
@@ -76,6 +80,7 @@ def test_pictures_of_the_rates(wells):
         wells.plot_slopes(source="neither")
 
 
+@pytest.mark.slow
 def test_an_attractor_without_a_density_is_named_and_too_few_nodes_are_refused(wells):
     with pytest.raises(vk.errors.StructureError, match="right-rest"):
         vk.StationaryDensity.of(part_of(wells, 0))

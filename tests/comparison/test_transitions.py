@@ -5,6 +5,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from tests.layers import long
 from vibrokit.comparison.in_trees import tree_costs
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.errors import StructureError
@@ -133,7 +134,7 @@ def test_prefactors_are_not_in_the_exponents():
 # Bounds
 
 
-@pytest.mark.parametrize(("seed", "count"), [(0, 2), (1, 3), (2, 3), (3, 4), (4, 5)])
+@pytest.mark.parametrize(("seed", "count"), [(0, 2), (1, 3), (2, 3), (3, 4), long(4, 5)])
 def test_bounds_hold_for_all_energies_between(seed, count):
     random = np.random.default_rng(seed)
     lower = random.exponential(size=(count, count))

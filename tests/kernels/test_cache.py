@@ -64,6 +64,7 @@ def section_map(cache, damping="0.05", steps="64", **environment):
     return python(MAP.replace("DAMPING", damping).replace("STEPS", steps), cache, **environment)
 
 
+@pytest.mark.slow
 def test_another_process_needs_no_sympy_compiles_nothing_and_finds_the_same_bits(cache):
     first_sympy, first = section_map(cache)
     kept = files(cache)
@@ -278,6 +279,7 @@ def test_a_module_that_a_formula_imports_does(tmp_path, monkeypatch):
     assert prints[0] != prints[1]
 
 
+@pytest.mark.long
 def test_the_same_class_has_the_same_fingerprint_in_another_process(cache, tmp_path):
     (tmp_path / "mine.py").write_text("""
 import dataclasses

@@ -111,6 +111,7 @@ def test_through_the_stops_of_the_paper(paper, stepper):
         assert off(covariance, true) < 1e-9
 
 
+@pytest.mark.slow
 def test_fixed_steps_converge(paper):
     """Across a Hertz contact the slope of the force, that C feels, goes like the root of the depth: order 1.5."""
     true = [reference(start, 0.0, paper.section_interval, additive)[2] for start in HITTING]

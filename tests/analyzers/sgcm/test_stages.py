@@ -23,6 +23,7 @@ def at(stages, place):
     return float(map_coordinates(np.exp(stages.log_values[0]), places, order=1)[0])
 
 
+@pytest.mark.slow
 def test_both_wells_are_reached_alike_from_the_saddle(problem):
     stages = committor_stages(problem, 1e-2)
     assert stages.intensity == 1e-2
@@ -31,6 +32,7 @@ def test_both_wells_are_reached_alike_from_the_saddle(problem):
     assert at(stages, (-1.0, 0.0)) < 0.05  # ΔU/D = 5
 
 
+@pytest.mark.long
 def test_more_noise_is_used_where_a_density_is_too_narrow(problem):
     stages = committor_stages(problem, 1e-7)
     assert stages.intensity > 1e-7
