@@ -1,17 +1,15 @@
 """The tutorials run as scripts, and what they find agrees with formulas that owe nothing to the code."""
 
-import runpy
 import tomllib
 from pathlib import Path
-from types import SimpleNamespace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.tutorials.pictures import assert_pictures
 from vibrokit.results.codes import Code
 
 pytestmark = pytest.mark.slow
@@ -19,39 +17,6 @@ pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parents[2]
 OMEGA_N, ZETA, OMEGA, F0, F1 = 1.0, 0.01, 0.57, 0.18, 0.2
 PERIOD = 2 * np.pi / OMEGA
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    """Run a tutorial by name, and return its names and the figures that it shows; it must leave no file behind."""
-    figures = []
-
-    def show():
-        figures.extend(map(plt.figure, plt.get_fignums()))
-        plt.close("all")
-
-    def script(name):
-        figures.clear()
-        made = runpy.run_path(str(REPOSITORY / "tutorials" / f"{name}.py"), run_name="__main__")
-        assert not plt.get_fignums()  # pictures come before the end
-        return SimpleNamespace(**made, figures=tuple(figures))
-
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("elsewhere")
-        patch.chdir(folder)
-        plt.switch_backend("agg")
-        patch.setattr(plt, "show", show)
-        yield script
-    assert not list(folder.iterdir())
-
-
-def assert_pictures(tutorial, count):
-    """Check the number of pictures, and that the axes of each have names."""
-    assert len(tutorial.figures) == count
-    for figure in tutorial.figures:
-        panels = figure.get_axes()
-        assert panels[0].get_ylabel()
-        assert any(panel.get_xlabel() for panel in panels)
 
 
 @pytest.mark.parametrize("path", sorted((REPOSITORY / "tutorials").glob("*.py")), ids=lambda path: path.stem)
@@ -258,103 +223,6 @@ def test_where_the_clear_motion_grazes(quiet):
 
 def test_pictures_of_the_structure(quiet):
     assert_pictures(quiet, 4)
-
-
-# -- 04: least action -------------------------------------------------------------------------------------------------
-
-CERTIFIED_CLEAR = 7.9052e-5  # by direct minimisation, tests/physics/reference_action.py: 7.905215e-5 ± 1e-11
-
-
-@pytest.fixture(scope="module")
-def least(run):
-    return run("04_least_action")
-
-
-def test_the_climb_out_of_a_well(least):
-    """ΔU is 4ζω_n times the barrier of x⁴/4 − x²/2, the path its relaxation run backwards."""
-    assert least.energy.value == pytest.approx(4 * 0.05 * 0.25, rel=1e-6)
-    assert least.misfit < 1e-6 * least.largest
-    heights = least.path.q[:, 0] ** 4 / 4 - least.path.q[:, 0] ** 2 / 2 + least.path.q[:, 1] ** 2 / 2
-    climbed = 4 * 0.05 * (heights + 0.25)
-    assert least.path.action == pytest.approx(climbed, abs=1e-6 * least.energy.value)
-
-
-def test_the_clear_state_is_left_at_the_certified_price(least):
-    assert least.clear.value == pytest.approx(CERTIFIED_CLEAR, rel=1e-4)
-    assert least.clear.lower <= least.clear.value <= least.clear.upper
-    assert [finding.source for finding in least.result.found(Code.AGREEMENT)][:1] == [0]
-
-
-def test_both_paths_solve_their_equations_and_end_on_the_saddle(least):
-    for energy in least.result.energies:
-        assert energy.certificate.residual < 1e-9
-        assert energy.certificate.error < 1e-5 * energy.value
-        assert energy.path.q[-1] == pytest.approx(least.saddle.points[0], abs=1e-3)
-        assert energy.path.action[-1] == pytest.approx(energy.value, rel=1e-5)
-    assert {(energy.source, energy.target) for energy in least.result.energies} == {(0, 1), (1, 0)}
-
-
-def test_shots_are_dearer_than_the_certified_path(least):
-    whole, ring = (found.energies[0] for found in (least.shots, least.ring))
-    assert CERTIFIED_CLEAR < whole.value < ring.value
-    assert whole.value < 1.01 * CERTIFIED_CLEAR
-
-
-def test_the_price_of_a_touch(least):
-    swing = F0 / np.sqrt((OMEGA_N**2 - OMEGA**2) ** 2 + (2 * ZETA * OMEGA_N * OMEGA) ** 2)
-    exact = 2 * ZETA * OMEGA_N**3 * (0.5 - F1 / OMEGA_N**2 - swing) ** 2
-    assert least.touch.value == pytest.approx(exact, rel=1e-8)
-    assert least.by_formula == pytest.approx(exact, rel=1e-12)
-
-
-def test_what_is_left_first_and_what_lasts(least):
-    assert least.transitions.most_stable == 1
-    assert least.transitions.cycle_hierarchy[0].source == 0
-
-
-def test_pictures_of_the_least_action(least):
-    assert_pictures(least, 4)
-
-
-# -- 05: densities ----------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def densities(run):
-    return run("05_densities")
-
-
-def test_density_of_the_well_is_the_one_of_boltzmann_to_a_depth_of_50(densities):
-    assert densities.stationary.occupancies.values == pytest.approx(0.5, rel=1e-6)
-    assert densities.depth == pytest.approx(50.0)
-    assert max(densities.misfits) < 0.25
-
-
-def test_rates_of_the_well_are_those_of_kramers(densities):
-    """The formula has an error of 2 % at these intensities (tests/physics/test_densities.py)."""
-    for rate in densities.left_rates:
-        expected = (np.sqrt(1.04) - 0.2) / (np.sqrt(2) * np.pi) * np.exp(-0.2 / rate.intensity)
-        assert rate.value == pytest.approx(expected, rel=0.08)
-        assert rate.lower <= expected <= rate.upper
-
-
-def test_both_wells_are_equally_likely_from_the_saddle(densities):
-    assert densities.at_saddle == pytest.approx(0.5, abs=0.005)
-    assert densities.time_ratios == pytest.approx(0.5, abs=0.005)
-
-
-def test_limit_of_weak_noise_is_the_barrier(densities):
-    assert densities.limit.lower <= 0.2 <= densities.limit.upper
-    assert densities.limit.value == pytest.approx(0.2, rel=0.01)
-
-
-def test_transients_are_those_of_simulated_trajectories(densities):
-    assert densities.history.mass == pytest.approx(1.0, abs=1e-3)
-    assert max(densities.differences) < 0.013  # 1.86 over the root of 20 000: exceeded by chance once in 500
-
-
-def test_pictures_of_the_densities(densities):
-    assert_pictures(densities, 4)
 
 
 # -- 06: exit times ---------------------------------------------------------------------------------------------------
