@@ -16,7 +16,6 @@ pytestmark = pytest.mark.slow
 
 RUNS = [4000, long(100_000)]
 LADDERS = {WELL: (0.11, 0.08, 0.06), STOP: (0.011, 0.008, 0.006)}
-NODES = {WELL: (80, 80), STOP: (120, 120)}
 SURE = 3.0  # standard errors of the simulated runs, of which there are some twenty numbers
 
 
@@ -38,7 +37,7 @@ def assessed(scene):
     osc, structure = scene_and_structure(scene)
     source = None if scene is WELL else label_near(structure, scene, 0)
     mfet = vk.MFET(intensities=LADDERS[scene], source=source, escapes=0).run(osc, structure)
-    sgcm = vk.SGCM(intensities=LADDERS[scene], source=source, nodes=NODES[scene]).run(osc, structure)
+    sgcm = vk.SGCM(intensities=LADDERS[scene], source=source, nodes=(120, 120)).run(osc, structure)
     return made(structure, {"mfet": mfet, "sgcm": sgcm})
 
 
