@@ -121,7 +121,7 @@ class Reconciliation(Record):
 
         Parameters
         ----------
-        ax : matplotlib Axes, optional
+        ax : matplotlib.axes.Axes, optional
         """
         from vibrokit.plots.exit_times import ArrheniusLine, ExitTimes, reconciled_times
 

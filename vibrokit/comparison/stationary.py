@@ -117,7 +117,7 @@ class StationaryDensity(metaclass=Constructed):
 
         Parameters
         ----------
-        ax : matplotlib Axes, optional
+        ax : matplotlib.axes.Axes, optional
         intensity : float, optional
             The nearest one that is known; by default the least.
         paths : sequence of array_like (count, 2)

@@ -72,7 +72,7 @@ def action_plot(
         Name of each attractor.
     energies : sequence of (int, float)
         Label of the attractor and value (m² s⁻³) of each energy: drawn as a horizontal line.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax, 6.4, 4.4)
     starts, least = list[Line2D](), list[Line2D]()
@@ -117,7 +117,7 @@ def action_map(
         Of each start, as in `action_plot`.
     name : str
         Of the attractor that is left.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax, 7.2, 3.6)
     theta, r, s = (np.asarray(values, dtype=float) for values in (angle, radius, action))

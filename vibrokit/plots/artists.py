@@ -20,7 +20,7 @@ class Artists:
 
     Attributes
     ----------
-    ax : matplotlib Axes
+    ax : matplotlib.axes.Axes
         Where it is drawn; the first one if the picture has several.
     """
 

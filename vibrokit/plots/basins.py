@@ -101,7 +101,7 @@ def basin_map(
     kinds : sequence of str, optional
         Kind of each attractor, which chooses its marker: ``"periodic"`` (circle), ``"equilibrium"`` (square),
         ``"limit cycle"`` (diamond), ``"chaotic"`` or ``"quasiperiodic"`` (dots). All periodic by default.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax, 5.4, 4.6)
     cells = np.asarray(labels)
@@ -151,7 +151,7 @@ def section_portrait(
         Branches of the manifolds as curves; parts outside the bounds are cut off.
     cycles : dict of int to array_like (count, 2), optional
         Limit cycles as curves, by label of the attractor.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
         A legend is put beside the picture, or inside axes that are given.
     """
     axes = axes_or_new(ax, 7.0, 4.8)

@@ -69,7 +69,7 @@ def bifurcation_diagram(
         What the legend calls each branch, by number; ``"branch 0"`` and so on by default.
     label : str
         Symbol and unit of the parameter, such as ``r"forcing frequency $\\omega$ (rad s$^{-1}$)"``.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
         A legend is put beside the picture, or inside axes that are given.
     """
     axes = axes_or_new(ax, 7.0, 4.4)
@@ -130,7 +130,7 @@ def basin_fractions(
         Symbol and unit of the parameter.
     branches : sequence of int, optional
         Number of each branch, which chooses its colour; in order from 0 by default.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
         A legend is put beside the picture, or inside axes that are given.
     """
     axes = axes_or_new(ax, 7.0, 4.0)
@@ -188,7 +188,7 @@ def energy_curves(
         lines.
     label : str
         Symbol and unit of the parameter.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
         A legend is put beside the picture, or inside axes that are given.
     """
     axes = axes_or_new(ax, 7.0, 4.4)

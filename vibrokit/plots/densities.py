@@ -39,7 +39,7 @@ def marginal_lines(
         In s.
     axis : str
         ``"x"`` or ``"v"``.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     ax = axes_or_new(ax)
     shades = colormaps["viridis"]
@@ -76,7 +76,7 @@ def sampled_density(
         In m and m⁻¹.
     sample : array_like (count,)
         Displacements (m).
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     shares, edges = np.histogram(np.asarray(sample, dtype=float), 120, density=True)
@@ -97,7 +97,7 @@ def density_map(x: ArrayLike, v: ArrayLike, density: ArrayLike, *, ax: Axes | No
         Nodes (m, m s⁻¹).
     density : array_like (nx, nv)
         In s m⁻².
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     image = axes.pcolormesh(x, v, np.transpose(density), cmap="magma_r", shading="nearest", rasterized=True)

@@ -47,7 +47,7 @@ def escapes(
         Such as the path of least action.
     points, saddles : sequence of array (count, n)
         Points on the section of each attractor and of each saddle.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     samples = paths[np.isfinite(paths).all(axis=2)]

@@ -89,7 +89,7 @@ def exit_paths(
         Points of saddle orbits, and samples of chaotic sets on the boundary.
     stable : sequence of array_like (count, 2)
         Branches of stable manifolds as curves.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
         A legend is put beside the picture, or above axes that are given, because paths cover the axes.
     """
     axes = axes_or_new(ax, 7.6, 4.8)

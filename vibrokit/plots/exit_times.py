@@ -86,7 +86,7 @@ def exit_times(exits: Sequence[ExitTimes], *, ax: Axes | None = None) -> ExitTim
     Parameters
     ----------
     exits : sequence of ExitTimes
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     labels, points = [one.label for one in exits], []
@@ -115,7 +115,7 @@ def reconciled_times(
         The method of each, which chooses its marker.
     lines : sequence of ArrheniusLine
         Drawn over all 1/D.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax, width=7.0, height=4.8)
     markers = dict(zip(dict.fromkeys(methods), itertools.cycle(MARKS)))
@@ -156,7 +156,7 @@ def exit_slopes(
     exits : sequence of ExitTimes
     limits : sequence of (label, title, value, lower, upper)
         Activation energies and their bounds (m² s⁻³), drawn over all D.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     points, seen = [], list[Any]()

@@ -57,7 +57,7 @@ def phase_portrait(
         Places of the stops (m).
     label : int
         Chooses the colour.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     dashes = (0, (4, 2))
@@ -87,7 +87,7 @@ def steady_motions(
         Place of each stop (m) and its side, ``"left"`` or ``"right"``.
     names : sequence of str, optional
         What the legend calls each motion; ``"attractor 0"`` and so on by default.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
         A legend is put beside the picture, or inside axes that are given.
     """
     axes = axes_or_new(ax, 7.0, 4.4)

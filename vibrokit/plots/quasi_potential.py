@@ -73,7 +73,7 @@ def quasi_potential_map(
     saddles : sequence of array_like (count, n)
     paths : sequence of array_like (count, n)
         Points of exit paths on the section.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax, 7.6, 4.8)
     psi = np.ma.masked_invalid(np.asarray(potential, dtype=float))

@@ -56,7 +56,7 @@ def scene_drawing(
         The side is ``"left"`` or ``"right"``.
     forces : sequence of str
     noise : str, optional
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax, 8.0, 3.9)
     if ax is None and (figure := axes.get_figure(root=True)) is not None:

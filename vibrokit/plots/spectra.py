@@ -33,7 +33,7 @@ def fitted_spectrum(
         In (m/s²)²/Hz.
     name : str
         Of the fit, for the legend.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     (points,) = axes.plot(frequencies, measured, ".", markersize=3, color=colour(0), label="measured")

@@ -38,7 +38,7 @@ def survival(
         Mean exit time (s).
     label : int
         Of the attractor that is left: chooses the colour.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax)
     known: Any = np.sort(np.asarray(times, dtype=float))

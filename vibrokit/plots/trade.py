@@ -33,7 +33,7 @@ def work_precision(rows: Sequence[Any], *, ax: Axes | None = None) -> TradeArtis
     ----------
     rows : sequence of TradeRow
         From coarse to fine; any objects with the attributes of `vibrokit.trade.steppers.TradeRow` will do.
-    ax : matplotlib Axes, optional
+    ax : matplotlib.axes.Axes, optional
     """
     axes = axes_or_new(ax, 6.4, 4.8)
     ensembles: list[Line2D] = []

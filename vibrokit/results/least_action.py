@@ -94,7 +94,7 @@ class ActionPlotResult(Result):
         ----------
         source : int or str, optional
             Label or name of the attractor that is left; by default the first that was searched.
-        ax : matplotlib Axes, optional
+        ax : matplotlib.axes.Axes, optional
 
         Raises
         ------

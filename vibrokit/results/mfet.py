@@ -128,7 +128,7 @@ class MFETResult(RatedResult):
 
         Parameters
         ----------
-        ax : matplotlib Axes, optional
+        ax : matplotlib.axes.Axes, optional
         source, target : int or str
         intensity : float, optional
         path : array_like (count, 2), optional

@@ -163,7 +163,7 @@ class RatedResult(Result):
 
         Parameters
         ----------
-        ax : matplotlib Axes, optional
+        ax : matplotlib.axes.Axes, optional
         source : int or str, optional
             By default all attractors.
         """
@@ -179,7 +179,7 @@ class RatedResult(Result):
 
         Parameters
         ----------
-        ax : matplotlib Axes, optional
+        ax : matplotlib.axes.Axes, optional
         source : int or str, optional
             By default all attractors.
         limits : iterable of ActivationEnergy

@@ -205,7 +205,7 @@ class Result(Record):
         ----------
         source : int or str, optional
             Label or name of the attractor; by default the first that has one.
-        ax : matplotlib Axes, optional
+        ax : matplotlib.axes.Axes, optional
 
         Raises
         ------
