@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import vibrokit as vk
@@ -186,6 +186,37 @@ def test_law_that_would_pull_is_let_go(clamped):
         z = z + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates((step + 1) * h, z + h * k3))
     assert fine == pytest.approx(z, abs=2e-7)
     assert coarse == pytest.approx(fine, abs=1e-7)
+
+
+@pytest.mark.parametrize("stepper", [vk.Order8(1e-10), vk.FreeFlight(1e-10)], ids=lambda stepper: stepper.name)
+@pytest.mark.parametrize("left", [0.3, 0.02, 1e-3])
+def test_law_that_pushes_again_before_release(stepper, left):
+    """A mass flies out of a stop whose law would pull, is slowed down, and is pushed once more before it leaves.
+
+    The law turns at v = −1/3, at the depth `left`. The reference is SciPy's, with steps that are short against it.
+    """
+    law = vk.CustomLaw("k*sqrt(depth)*(1 + c*rate)", k=HERTZ, c=3.0)
+    start, duration = np.array([left + (1.0 - 1.0 / 9.0) / 2.0, -1.0]), 2.0
+    osc = vk.Oscillator(
+        natural_frequency=1.0, damping_ratio=0.0, spring=vk.LinearSpring(0.0),
+        barriers=(vk.Barrier(law, 0.0, "right"),), excitations=(vk.Constant(1.0),),
+    )  # fmt: skip
+
+    def rates(_, q):
+        push = max(HERTZ * np.sqrt(max(q[0], 0.0)) * (1.0 + 3.0 * q[1]), 0.0)
+        return [q[1], 1.0 - push]
+
+    def turns(_, q):
+        return q[1] + 1.0 / 3.0 if q[0] > 0.0 else 1.0
+
+    def touches(_, q):
+        return q[0]
+
+    exact = solve_ivp(
+        rates, (0.0, duration), start, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-4, events=[turns, touches]
+    ).y[:, -1]
+    found = osc.trajectory(start, duration=duration, samples=2, stepper=stepper)
+    assert [found.x[-1], found.v[-1]] == pytest.approx(exact, abs=1e-7)
 
 
 def test_a_path_passes_through_the_sections(kernel):

@@ -132,6 +132,9 @@ def turn(i, tiny, lane, memory, pushing, theta, settings, lanes, room):
     """
     pulled, length = memory[PULLED] != 0.0, lanes[LENGTH + lane]
     if pulled and depth_at(TRIAL, i, lane, lanes, theta) < 0.0:
+        # A law that pushes at release began to push within this step: shorter steps find where.
+        if not tiny and law(i, 1e-30, side_of(i, theta) * of(TRIAL, 1, lane, lanes), theta) > 0.0:
+            return ask(0.5 * length, lane, memory, settings, lanes)
         land(RELEASES, DEPTH_GOAL, i, length, lane, memory, theta, lanes)
         return UNDERWAY
     before = push_of(i, of(STATE, 0, lane, lanes), of(STATE, 1, lane, lanes), theta)
