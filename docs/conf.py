@@ -42,6 +42,7 @@ sphinx_gallery_conf = {
     "ignore_pattern": r"__",
     "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
+    "capture_repr": (),  # only print writes output
     "download_all_examples": False,
     "show_signature": False,
     "remove_config_comments": True,
