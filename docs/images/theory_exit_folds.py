@@ -79,5 +79,7 @@ if __name__ == "__main__":
     found = np.concatenate([crossings(line, CUT) for line in lines])
     found = found[found[:, 1] < HIGHEST]
     cut.plot(found[:, 0], found[:, 1], ".", color="black", markersize=2)
-    cut.set(xlabel="position $x$ (m)", ylabel=r"action $S$ (m$^2$ s$^{-3}$)", title=f"on the line v = {CUT} m s$^{{-1}}$")
+    cut.set(
+        xlabel="position $x$ (m)", ylabel=r"action $S$ (m$^2$ s$^{-3}$)", title=f"on the line v = {CUT} m s$^{{-1}}$"
+    )
     figure.savefig(Path(__file__).with_suffix(".png"), dpi=80)

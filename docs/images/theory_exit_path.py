@@ -46,7 +46,11 @@ early = turns < 0.5 * turns[-1]
 late = (turns > 0.5 * turns[-1]) & (left > 1e-8 * energy.value)
 history.semilogy(turns[early], path.action[0] * np.exp(growth * turns[early]), "k--", linewidth=0.8)
 at = np.flatnonzero(late)[-1]
-history.semilogy(turns[late], left[at] * np.exp(decay * (turns[at] - turns[late])), "k--", linewidth=0.8, label="linear")
-history.set(xlabel="section intervals from the start", ylabel=r"m$^2$ s$^{-3}$", ylim=(1e-8 * energy.value, 3 * energy.value))
+history.semilogy(
+    turns[late], left[at] * np.exp(decay * (turns[at] - turns[late])), "k--", linewidth=0.8, label="linear"
+)
+history.set(
+    xlabel="section intervals from the start", ylabel=r"m$^2$ s$^{-3}$", ylim=(1e-8 * energy.value, 3 * energy.value)
+)
 history.legend(loc="lower center")
 figure.savefig(Path(__file__).with_suffix(".png"), dpi=80)

@@ -48,7 +48,9 @@ if __name__ == "__main__":
         path, noise = least_path(times[-1], times)
         cost.plot(turns, least_action(times[-1]), "o", color=colour)
         for axes, values in ((motion, path), (force, noise)):
-            axes.plot(times / TURN - turns, values, color=colour, linewidth=1.2, label=f"{turns} turn{'s' * (turns > 1)}")
+            axes.plot(
+                times / TURN - turns, values, color=colour, linewidth=1.2, label=f"{turns} turn{'s' * (turns > 1)}"
+            )
     motion.set(xlabel=r"turns before the end", ylabel=r"displacement $x/c$")
     force.set(xlabel=r"turns before the end", ylabel=r"noise force $p_2/(\omega_n^2c)$")
     for axes in (motion, force):

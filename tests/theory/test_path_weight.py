@@ -64,9 +64,7 @@ def euler_lagrange(force):
     acceleration = sympy.Symbol("acceleration")
     lagrangian = (acceleration - force) ** 2 / 2
     along = {X: x, V: sympy.diff(x, t), acceleration: sympy.diff(x, t, 2)}
-    by_x, by_v, by_a = (
-        sympy.diff(lagrangian, q).subs(along, simultaneous=True).doit() for q in (X, V, acceleration)
-    )
+    by_x, by_v, by_a = (sympy.diff(lagrangian, q).subs(along, simultaneous=True).doit() for q in (X, V, acceleration))
     return by_x - sympy.diff(by_v, t) + sympy.diff(by_a, t, 2)
 
 
@@ -140,7 +138,11 @@ def test_pushes_of_given_duration_solve_hamilton_s_equations(picture, turns):
     last = np.linalg.solve(picture.covariance(duration), [1.0, 0.0])
     first = picture.expm(picture.SLOPE.T * duration) @ last
     ended = solve_ivp(
-        lambda _, y: np.asarray(rate(y[:4]), dtype=float).ravel(), (0, duration), [0, 0, *first, 0], rtol=1e-11, atol=1e-13
+        lambda _, y: np.asarray(rate(y[:4]), dtype=float).ravel(),
+        (0, duration),
+        [0, 0, *first, 0],
+        rtol=1e-11,
+        atol=1e-13,
     ).y[:, -1]
     np.testing.assert_allclose(ended[:2], [1.0, 0.0], atol=1e-9)
     assert ended[4] == pytest.approx(picture.least_action(duration), rel=1e-8)
