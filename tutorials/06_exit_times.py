@@ -166,7 +166,7 @@ inverse = np.linspace(22, 110, 50)
 logs = [-kramers(1 / one)[0] for one in inverse]
 (line,) = ax.plot(inverse, logs, "k--", label="Kramers' formula")
 place, log_time = 1 / rare.intensity, -rare.log_value
-point = ax.errorbar(place, log_time, rare.log_error, fmt="s", label="splitting")
+point = ax.errorbar(place, log_time, rare.log_error, fmt="sC1", label="splitting")
 ax.legend(handles=[*artists.points, point, line])
 
 # %%
