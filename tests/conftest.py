@@ -28,11 +28,14 @@ def clock(monkeypatch):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Count long tests and the examples of the manual among the slow ones, and put tutorials first.
+    """Put examples of the manual into a layer, count long tests among the slow ones, and put tutorials first.
 
-    Workers take the last tests from each other, and would run tutorials twice.
+    The examples of the reference call each public object; those of other pages compute what other tests show. Workers
+    take the last tests from each other, and would run tutorials twice.
     """
     for item in items:
-        if item.get_closest_marker("long") or isinstance(item, pytest.DoctestItem):
+        if isinstance(item, pytest.DoctestItem):
+            item.add_marker("slow" if item.path.parent.name == "reference" else "long")
+        if item.get_closest_marker("long"):
             item.add_marker("slow")
     items.sort(key=lambda item: item.path.name != "test_tutorials.py")

@@ -10,12 +10,14 @@ import pytest
 SCENES = Path(__file__).parents[2] / "docs/scenes"
 SCRIPTS = sorted(SCENES.glob("*.py"))
 QUICK = ("bouncing_ball", "ueda")
+LONG = ("grazing_chaos", "heat_exchanger_tube", "paper_scene")  # the manual runs them, too
 LIBRARIES = {"math", "matplotlib", "numpy", "vibrokit"}
 
 
 def layered(path):
     """A script in the layer that it belongs to."""
-    return pytest.param(path, id=path.stem, marks=[] if path.stem in QUICK else [pytest.mark.slow])
+    mark = pytest.mark.long if path.stem in LONG else pytest.mark.slow
+    return pytest.param(path, id=path.stem, marks=[] if path.stem in QUICK else [mark])
 
 
 @pytest.mark.parametrize("path", [layered(path) for path in SCRIPTS])

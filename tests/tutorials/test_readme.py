@@ -68,7 +68,7 @@ def pages_with(language):
         pytest.param(
             page,
             id=page.relative_to(REPOSITORY).as_posix(),
-            marks=[pytest.mark.long] * (page.parent.name == "how-to" and page.stem in LONG),
+            marks=[pytest.mark.long] * (page.parent.name == "theory" or page.stem in LONG),
         )
         for page in pages
     ]

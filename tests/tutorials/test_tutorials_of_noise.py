@@ -1,4 +1,4 @@
-"""The tutorials on least action and on densities run as scripts, and what they find agrees with formulas.
+"""The tutorials on least action, densities and an assessment run as scripts, and what they find agrees with formulas.
 
 They are long, since the manual runs them, too, and others show the same: tests/physics/test_least_action.py and
 test_densities.py.
@@ -109,3 +109,41 @@ def test_transients_are_those_of_simulated_trajectories(densities):
 
 def test_pictures_of_the_densities(densities):
     assert_pictures(densities, 4)
+
+
+# -- 08: from a spectrum to a verdict ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def lever(run):
+    return run("08_from_spectrum_to_verdict")
+
+
+def test_record_gives_the_true_inputs(lever):
+    """The amplitude of a wave in white noise has the variance 2σ²/n from n samples, σ² = D times the sampling rate."""
+    true_intensity = 2e-6 * 9.80665**2 / 2
+    assert abs(lever.amplitude - 4.5 / 0.42) < 4 * np.sqrt(2 * true_intensity / 32)
+    assert abs(lever.D - true_intensity) < 4 * lever.D_error
+    assert lever.D_error / lever.D == pytest.approx(np.sqrt(1 / (0.3 * 1024 * 32)), rel=0.1)
+    assert lever.estimate.misfit == pytest.approx(1.0, abs=0.2)
+
+
+def test_scene_of_the_drawing(lever):
+    assert lever.osc.own_frequency == pytest.approx(np.sqrt(31e3 / 0.42), rel=1e-12)
+    assert lever.osc.parameters["barriers.0.law.stiffness"] == pytest.approx(1.5e6 / 0.42, rel=1e-12)
+    assert lever.osc.parameters["noise.intensity"] == lever.D
+
+
+def test_verdict_on_the_lever(lever):
+    """An exit touches a stop first, at the price of the linear oscillator."""
+    rate, drive = np.sqrt(31e3 / 0.42), 2 * np.pi * 54
+    swing = lever.amplitude / abs(rate**2 - drive**2 + 0.03j * rate * drive)
+    assert lever.energy.value > 2 * 0.015 * rate**3 * (3e-4 - swing) ** 2
+    time = lever.a.mean_time("clear")
+    assert 0.1 < time.value * np.exp(-lever.ratio) * 54 < 100  # the prefactor in periods
+    assert lever.a.probability_of_leaving("clear", "1 h").value == pytest.approx(-np.expm1(-3600 / time.value))
+    assert [verdict.code.value for verdict in lever.a.reconciliation.verdicts] == ["agree"]
+
+
+def test_pictures_of_the_lever(lever):
+    assert_pictures(lever, 2)
