@@ -32,6 +32,9 @@ figure.colorbar(shades, ax=exact, label=r"$\Psi$ (m$^2$ s$^{-3}$)")
 
 osc = vk.load_scene("hertz-0.570")
 states = vk.find_structure(osc, cells=(100, 100), manifolds=False, rng=0)
-settings = vk.GraphSearch(nodes=(160, 160))
-vk.LeastAction(source="clear", graph=settings).run(osc, states).plot_quasi_potential("clear", ax=forced)
+graph = vk.ActionGraph(source="clear", nodes=(120, 120), steps_per_period=16).run(osc, states)
+graph.plot(ax=forced)
+(energy,) = vk.LeastAction(source="clear", graph=None).run(osc, states).energies
+points = energy.path.q[energy.path.section]
+forced.plot(points[:, 0], points[:, 1], ".-", color="#c4007a", markersize=4, linewidth=0.5)
 figure.savefig(Path(__file__).with_suffix(".png"), dpi=80)
