@@ -1,6 +1,6 @@
-"""Draws theory_path_durations.png, a picture of docs/theory/path-weight.rst:
+"""Draws theory_path_durations.png, a picture of docs/theory/path-weight.rst.
 
-python docs/images/theory_path_durations.py
+Run it with python docs/images/theory_path_durations.py
 """
 
 from pathlib import Path

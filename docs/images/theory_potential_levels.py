@@ -37,4 +37,5 @@ graph.plot(ax=forced)
 (energy,) = vk.LeastAction(source="clear", graph=None).run(osc, states).energies
 points = energy.path.q[energy.path.section]
 forced.plot(points[:, 0], points[:, 1], ".-", color="#c4007a", markersize=4, linewidth=0.5)
+forced.set_xlabel("position $x$ (m)")
 figure.savefig(Path(__file__).with_suffix(".png"), dpi=80)
