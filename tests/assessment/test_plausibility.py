@@ -64,6 +64,35 @@ def test_the_tube_grazes_its_stops_where_its_amplitude_is_the_gap():
         assert (plausibility(osc).value(Measure.AMPLITUDE_OVER_GAP, "right") > 1) is touches
 
 
+def test_above_grazing_no_state_is_clear():
+    """At F/√((ω_n² − ω²)² + (2ζω_nω)²) = gap the linear motion grazes; an offset rest has the nearer stop."""
+    w, natural = 2 * math.pi * 65, TUBE.natural_frequency
+    grazing = 2.5e-4 * math.hypot(natural**2 - w**2, 2 * 0.008 * natural * w)
+    for ratio in (0.99, 1.0, 1.02, 7.3):
+        changed = TUBE.replace({"excitations.0.amplitude": ratio * grazing})
+        odd = [one for one in plausibility(changed).oddities if one.code is OddityCode.NO_CLEAR_STATE]
+        assert [one.values["ratio"] for one in odd] == ([pytest.approx(ratio)] if ratio > 1.01 else [])
+    assert "would be 7.3 times the gap" in str(odd[0])
+    (moved,) = plausibility(changed.replace({"barriers.1.position": -5e-4})).oddities
+    assert (moved.values["side"], moved.values["ratio"]) == ("right", pytest.approx(7.3))
+    assert OddityCode.NO_CLEAR_STATE in codes(changed.replace(spring=vk.LinearSpring(natural**2)))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"spring": vk.CubicSpring(TUBE.natural_frequency**2, 1.0)},  # nearly linear, and not certain
+        {"damping_ratio": 0.0},  # free oscillations last, so that the forced one is not the only motion
+        {"friction": vk.DryFriction(1e-9, 1e-3)},
+        {"excitations": (vk.Harmonic(200.0, 408.0), vk.Harmonic(200.0, 408.0 * math.sqrt(2)))},  # no section
+    ],
+)
+def test_where_the_linear_response_decides_nothing_it_says_nothing_of_clear_states(changes):
+    forced = TUBE.replace({"excitations.0.amplitude": 200.0})
+    assert OddityCode.NO_CLEAR_STATE in codes(forced)
+    assert OddityCode.NO_CLEAR_STATE not in codes(forced.replace(**changes))
+
+
 @pytest.mark.parametrize(("power", "law"), [(1.0, vk.Linear(40.0)), (1.5, vk.Hertz(40.0)), (2.0, None), (0.5, None)])
 def test_contact_times_of_power_laws(power, law):
     """T = 2 (d/v) ∫₀¹ du/√(1 − u^(n+1)), d = ((n+1) v²/2k)^(1/(n+1))."""

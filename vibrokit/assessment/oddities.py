@@ -56,6 +56,11 @@ class OddityCode(Sentenced):
         "A contact with the {side} stop lasts {ratio:.2g} of a period: integration needs very short steps. Check the "
         "unit of its stiffness.",
     )
+    NO_CLEAR_STATE = (
+        "no-clear-state",
+        "Without contact the forced motion would be {ratio:.4g} times the gap to the {side} stop: no steady state runs "
+        "clear of the stops, whatever the noise. The force or the clearance decides this.",
+    )
     NOISE_STRONG = (
         "noise-strong",
         "The noise alone moves the mass by {ratio:.3g} times the gap to the {side} stop (rms): no state lasts. D is in "

@@ -14,8 +14,10 @@ from scipy.optimize import brentq
 from vibrokit.assessment.linear_response import LinearResponse, departure, linear_response
 from vibrokit.assessment.oddities import Oddity, OddityCode
 from vibrokit.construction import called
+from vibrokit.errors import NoSectionError
 from vibrokit.oscillator import Oscillator, check_oscillator
 from vibrokit.parts.barrier import Barrier
+from vibrokit.parts.spring import LinearSpring
 from vibrokit.symbolic.numeric import amplitude_at, contact_force_of
 from vibrokit.text_table import text_table
 from vibrokit.text_units import STANDARD_GRAVITY
@@ -26,6 +28,7 @@ _NEAR = 2.0  # of f/f_n: where systems with stops are forced; 2π away from it, 
 _HEAVY = 0.5  # of the damping ratio: above it there is no resonance, and 0.5 % is 0.005
 _NEVER = 1e3  # of ΔU/D: exp(1000) periods is longer than anything
 _BRIEF = 1e-4  # of a period: fixed steps that resolve a contact are beyond 10⁵ in a period
+_BEYOND = 1.01  # of displacement over gap: tones beyond the 63rd, which the response leaves out, are less
 _LINEAR = 0.1  # departure of the forces from linear ones, as a part of these, up to which linear responses are given
 
 
@@ -112,6 +115,7 @@ def plausibility(osc: Oscillator) -> Plausibility:
     if response is not None:
         for index, barrier in enumerate(osc.barriers):
             found += _stop(osc, response, index, barrier)
+        found += _always_touching(osc, response)
     if osc.damping_ratio is not None and osc.damping_ratio >= _HEAVY:
         found.append(Oddity(OddityCode.HEAVY_DAMPING, {"ratio": osc.damping_ratio}))
     return Plausibility(
@@ -205,6 +209,27 @@ def _reach(osc: Oscillator, response: LinearResponse, side: str, gap: float) -> 
         yield Row(Measure.FIRST_CONTACT_OVER_D, ratio, side)
         if ratio > _NEVER:
             yield Oddity(OddityCode.NOISE_WEAK, {"side": side, "ratio": ratio})
+
+
+def _always_touching(osc: Oscillator, response: LinearResponse) -> Iterator[Oddity]:
+    """The stop that every steady motion reaches, by the largest ratio of displacement to gap, if it is certain.
+
+    A linear scene with damping has one steady motion without contact, which a clear steady state would have to be.
+    """
+    linear = osc.friction is None and (osc.spring is None or type(osc.spring) is LinearSpring)
+    if not linear or response.damping <= 0 or any(part.depends_on_state for part in osc.excitations):
+        return
+    try:
+        if not math.isfinite(osc.period or math.inf):
+            return
+    except NoSectionError:
+        return
+    reaches = {"left": response.left, "right": response.right}
+    gaps = {barrier.side: barrier.sign * (barrier.position - response.rest) for barrier in osc.barriers}
+    ratios = {side: reaches[side] / gap for side, gap in gaps.items() if gap > 0}
+    side = max(ratios, key=lambda one: ratios[one], default="")
+    if side and ratios[side] > _BEYOND:
+        yield Oddity(OddityCode.NO_CLEAR_STATE, {"side": side, "ratio": ratios[side]})
 
 
 def contact_time(osc: Oscillator, index: int, speed: float) -> float:
