@@ -123,6 +123,19 @@ def test_allowed_intensity_is_the_inverse_of_the_mean_time(assessment):
         assert found.psd[0] == pytest.approx(2 * found.value)
 
 
+@pytest.mark.parametrize(
+    ("unit", "size", "said"),
+    [("g_n^2/Hz", 9.80665**2, True), ("N^2/Hz", 1 / 4, True), ("(m/s^2)^2/Hz", 1.0, False)],
+)
+def test_allowed_intensity_is_also_in_the_unit_of_the_scene(assessment, unit, size, said):
+    """The one-sided density is 2D; the mass of 2 kg divides forces."""
+    given = {"noise.intensity": f"{3e-5 / size!r} {unit}"}
+    found = dataclasses.replace(assessment, scene={**SCENE, "mass": 2.0, "given": given}).allowed_intensity(0, "1 yr")
+    value, lower, upper = (2 * one / size for one in (found.value, found.lower, found.upper))
+    assert found.number.endswith(f", which is {value:.3g} ({lower:.3g} to {upper:.3g}) {unit}") is said
+    assert found.number.startswith(str(assessment.allowed_intensity(0, "1 yr").number))
+
+
 def test_occupancies_balance_the_rates(assessment):
     for intensity in (4e-5, 1.5e-5, 8e-6):
         shares = assessment.occupancy(intensity=intensity)

@@ -96,9 +96,12 @@ class AllowedIntensity(Answer):
     ----------
     psd_ratio : float
         One-sided power spectral density of the acceleration at rest over D: 2 for white noise; NaN for coloured noise.
+    given_unit : tuple of (str, float), optional
+        Unit in which the scene gives its noise intensity, and D of that size (m² s⁻³); None for a number without one.
     """
 
     psd_ratio: float
+    given_unit: tuple[str, float] | None = None
 
     @property
     def psd(self) -> tuple[float, float, float]:
@@ -107,11 +110,16 @@ class AllowedIntensity(Answer):
 
     @property
     def number(self) -> str:
-        """D and the spectral density that it stands for."""
-        value, lower, upper = self.psd
-        if math.isnan(value):
-            return super().number
-        return f"{super().number}, a PSD of {value:.3g} ({lower:.3g} to {upper:.3g}) (m/s²)²/Hz"
+        """D, the spectral density that it stands for, and the same in the unit of the scene."""
+        texts, (value, lower, upper) = [super().number], self.psd
+        if not math.isnan(value):
+            texts.append(f"a PSD of {value:.3g} ({lower:.3g} to {upper:.3g}) (m/s²)²/Hz")
+        if self.given_unit is not None:
+            unit, size = self.given_unit
+            if not math.isclose(size * self.psd_ratio, 1.0, rel_tol=1e-9):  # another unit than that above
+                value, lower, upper = self.value / size, self.lower / size, self.upper / size
+                texts.append(f"which is {value:.3g} ({lower:.3g} to {upper:.3g}) {unit}")
+        return ", ".join(texts)
 
 
 def probability_within(time: float, leaving: LogTime, goal: LogTime, relaxation: float) -> tuple[float, float, float]:

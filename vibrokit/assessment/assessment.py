@@ -25,6 +25,7 @@ from vibrokit.comparison.sensitivities import Sensitivity, sensitivities
 from vibrokit.comparison.verdicts import exit_name
 from vibrokit.construction import called
 from vibrokit.errors import ResultFileError, StructureError, shown
+from vibrokit.quantity import size_of, unit_in
 from vibrokit.results.arrays import Arrays
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.files import nested, records_in
@@ -81,6 +82,15 @@ class Assessment(Record):
     def psd_ratio(self) -> float:
         """One-sided power spectral density of the acceleration at rest over D; NaN for coloured noise."""
         return self.plausibility.value(Measure.PSD) / self.intensity
+
+    @property
+    def _given_unit(self) -> tuple[str, float] | None:
+        """Unit in which the scene gives its noise intensity, and its size (m² s⁻³); None for a number without one."""
+        text = self.scene.get("given", {}).get("noise.intensity")
+        if text is None:
+            return None
+        unit = unit_in(text)
+        return unit, size_of(unit, "m^2 s^-3", self.scene.get("mass"))
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -214,6 +224,7 @@ class Assessment(Record):
             question=f"largest noise intensity at which {leaving} after {mean_time} on average",
             value=found.intensity, lower=lower, upper=upper, unit="m² s⁻³", intensity=found.intensity,
             methods=found.methods, extrapolated=found.extrapolated, psd_ratio=self.psd_ratio,
+            given_unit=self._given_unit,
         )  # fmt: skip
 
     @called
