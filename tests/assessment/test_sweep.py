@@ -15,6 +15,7 @@ from vibrokit.cli import main
 from vibrokit.errors import ParameterError, StructureError
 from vibrokit.report.tables import along_table, coexistence_table, gap_table
 from vibrokit.results.codes import Code
+from vibrokit.results.continuation import Bifurcation, SteadyStates
 from vibrokit.results.energy_continuation import EnergyBranch, EnergyContinuation
 from vibrokit.results.finding import Finding
 from vibrokit.results.sweep import Prefactor, Sweep
@@ -41,6 +42,57 @@ def test_a_branch_exists_in_stretches_between_gaps():
     assert found[1] == ("clear", high, "nothing beyond", high, "goes on")
     assert found[2] == (one.names[1], low, "goes on", low, "nothing beyond")
     assert one.gaps == ((gap, "it diverged."),)
+
+
+def along_contacts(depths, grazings, ends=()):
+    """A sweep of one branch along 0, 1, 2, …: depths past both stops at each value; None without a state."""
+    (one, *_) = full_continuation().states[0].attractors
+    states = []
+    for value, pair in enumerate(depths):
+        found = [] if pair is None else [dataclasses.replace(one, peak_depth={"left": pair[0], "right": pair[1]})]
+        states.append(SteadyStates(float(value), tuple(found), (0,) * len(found)))
+    marks = [("grazing", value, side) for value, side in grazings] + [(kind, value, "") for value, kind in ends]
+    made = dataclasses.replace(
+        full_continuation(), states=tuple(states), branch_names=("one",),
+        bifurcations=tuple(Bifurcation(kind, value, 0.0, 0, 1, np.zeros(2), side) for kind, value, side in marks),
+    )  # fmt: skip
+    return dataclasses.replace(empty(), states=made, scene={"barriers": [{"position": 1.0}, {"position": -1.0}]})
+
+
+NONE, RIGHT, BOTH = (0.0, 0.0), (0.0, 0.1), (0.1, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("swept", "rows"),
+    [
+        (along_contacts([NONE, BOTH], [(0.25, "left"), (0.25 + 1e-12, "right"), (0.75, "right")]),
+         [(0, "goes on", 0.25, "grazing", ""), (0.25, "grazing", 1, "goes on", "left right")]),
+        (along_contacts([NONE, BOTH, RIGHT], [(0.25, "right"), (0.5, "left"), (1.25, "left"), (1.5, "left")]),
+         [(0, "goes on", 0.25, "grazing", ""), (0.25, "grazing", 0.5, "grazing", "right"),
+          (0.5, "grazing", 1.5, "grazing", "left right"), (1.5, "grazing", 2, "goes on", "right")]),
+        (along_contacts([RIGHT, NONE], []),
+         [(0, "goes on", 0.5, "not located", "right"), (0.5, "not located", 1, "goes on", "")]),
+        (along_contacts([NONE, NONE], [(0.25, "left"), (0.75, "left")]),
+         [(0, "goes on", 0.25, "grazing", ""), (0.25, "grazing", 0.75, "grazing", "left"),
+          (0.75, "grazing", 1, "goes on", "")]),
+        (along_contacts([NONE, None], [(0.25, "left")], [(0.75, "fold")]),  # it touches before it ends
+         [(0, "goes on", 0.25, "grazing", ""), (0.25, "grazing", 0.75, "fold", "left")]),
+        (along_contacts([None, NONE], [(0.75, "left")], [(0.25, "fold")]),
+         [(0.25, "fold", 0.75, "grazing", "left"), (0.75, "grazing", 1, "goes on", "")]),
+        (along_contacts([NONE, None], [(0.25, "left")]), [(0, "goes on", 0.25, "grazing", "")]),
+    ],
+)  # fmt: skip
+def test_a_branch_has_a_row_for_each_set_of_stops_that_it_touches(swept, rows):
+    found = [(one.first, one.begins, one.last, one.ends, " ".join(one.touches)) for one in swept.coexistence]
+    assert found == rows
+    table = coexistence_table(swept)
+    assert table.header[5] == "contact"
+    said = {"": "clear of stops", "left": "touches left", "right": "touches right"}
+    assert [row[5] for row in table.rows] == [said.get(row[4], "touches left and right") for row in rows]
+    lines = [line for line in swept.plot().ax.lines if line.get_label().startswith("one from ")]
+    scale = swept.axis()[1]
+    np.testing.assert_allclose([line.get_xdata()[0] * scale for line in lines], [row[0] for row in rows[1:]])
+    assert [line.get_label().split(": ")[1] for line in lines] == [row[5] for row in table.rows[1:]]
 
 
 def with_paths(unit=None):
@@ -140,6 +192,9 @@ def test_linear_response_and_grazing_along_a_frequency_in_hertz():
     assert (push > 0).tolist() == [False, False, True]
     (touch, *_) = (one for one in found.states.bifurcations if one.kind == "grazing")
     assert touch.value == pytest.approx(grazing, rel=1e-8)
+    clear, hits = (one for one in found.coexistence if one.name == "clear-and-hammering")
+    assert clear.last == hits.first == pytest.approx(grazing, rel=1e-8)
+    assert (clear.touches, hits.touches) == ((), ("left", "right"))
     said = [finding.values["value"] for finding in found.found(Code.BIFURCATION) if finding.values["kind"] == "grazing"]
     assert said[0] == pytest.approx(grazing / (2 * math.pi), rel=1e-8)
     assert found.energies is None
@@ -152,8 +207,10 @@ def test_both_gaps_together_with_values_at_which_the_scene_is_refused():
     found = vk.sweep(between_stops(), tied, gaps, unit="mm", starts=(4, 4))
     assert found.gaps[0][0] == pytest.approx(-0.01)
     assert [value for value, _ in found.gaps] == [found.values[0]]
-    assert {span.begins for span in found.coexistence} == {"nothing beyond"}
+    assert {span.begins for span in found.coexistence} == {"nothing beyond", "grazing"}
     (on,) = (span.name for span in found.coexistence if span.ends == "goes on")
+    (clear,) = (span for span in found.coexistence if not span.touches)
+    assert clear.first == pytest.approx(amplitude(0.6), rel=1e-8)
     (touch, *_) = (one for one in found.states.bifurcations if one.kind == "grazing")
     assert touch.value == pytest.approx(amplitude(0.6), rel=1e-8)
     np.testing.assert_allclose(found.along(on)[1][2], amplitude(0.6), rtol=SAMPLED)

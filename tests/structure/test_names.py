@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibrokit.results.attractor import Attractor
-from vibrokit.structure.attractors.names import labelled, names_of
+from vibrokit.structure.attractors.names import branch_names_of, labelled, names_of
 
 
 def made(kind="periodic", period=1, *, width=1.0, middle=0.0, hits=0, depth=0.0):
@@ -56,3 +56,22 @@ def test_names(attractors, names):
 def test_an_orbit_without_stops_is_an_oscillation():
     assert names_of([made(width=1.0), made(width=3.0)], has_stops=False) == ("small-oscillation", "large-oscillation")
     assert names_of([made(period=3)], has_stops=False) == ("oscillation-period-3",)
+
+
+@pytest.mark.parametrize(
+    ("branch", "name"),
+    [
+        ([made(), made(width=2.0)], "clear"),
+        ([made(), made(hits=1, depth=0.1), made(hits=2, depth=0.2), made()], "clear-and-hammering"),
+        ([made(hits=2, depth=0.1), made()], "hammering-and-clear"),
+        ([made(period=3), made(period=3, hits=1, depth=0.1)], "clear-and-hammering-period-3"),
+        ([made(**REST), made(**PRESSED)], "rest-and-pressed"),
+        ([made(depth=0.1), made(hits=1, depth=0.1)], "pressed-and-hammering"),
+        ([made(), made("chaotic", 0, hits=1.5, depth=0.1)], "clear-and-chaotic"),
+        ([made(hits=1, depth=0.1), made("chaotic", 0, hits=1.5, depth=0.1)], "hammering"),
+        ([made("limit cycle"), made("limit cycle", hits=1, depth=0.1)], "cycle"),  # says nothing of stops
+    ],
+)
+def test_a_branch_has_the_names_of_all_its_contacts(branch, name):
+    assert branch_names_of([branch], has_stops=True) == (name,)
+    assert branch_names_of([branch, branch], has_stops=True) == (name, f"{name}-2")

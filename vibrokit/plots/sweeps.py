@@ -69,6 +69,7 @@ def sweep(
     *,
     stops: Sequence[ArrayLike] = (),
     marks: Sequence[tuple[str, float, int]] = (),
+    changes: Sequence[tuple[float, int, str]] = (),
     lost: Sequence[tuple[float, float, int]] = (),
     intensity: ArrayLike = 0.0,
     searched: ArrayLike = (),
@@ -88,6 +89,8 @@ def sweep(
         Position of each stop (m).
     marks : sequence of (kind, value, branch)
         Bifurcations.
+    changes : sequence of (value, branch, text)
+        Where a branch begins or ceases to touch a stop: a dotted line, with the text in the legend.
     lost : sequence of (value, action, branch)
         Where exit paths were lost (m² s⁻³).
     intensity : float or array_like (values,)
@@ -127,6 +130,8 @@ def sweep(
     at_foot: dict[str, Any] = {"transform": first.get_xaxis_transform(), "markersize": 5, "clip_on": False}
     for kind, value, branch in marks:
         drawn += first.plot(value, 0.02, "^", color=colour(branch), label=f"_{kind}", **at_foot)
+    for value, branch, text in changes:
+        first.axvline(value, color=colour(branch), linestyle=":", linewidth=1.0, label=text, zorder=0)
     cross: dict[str, Any] = {"markersize": 8, "markeredgewidth": 1.6, "label": "_lost"}
     for value, action, branch in lost if "energy" in panels else ():
         ends += panels["energy"].plot(value, action, "x", color=colour(branch), **cross)

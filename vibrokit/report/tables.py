@@ -20,7 +20,7 @@ from vibrokit.results.labels import goal_name
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
-from vibrokit.results.sweep import Sweep
+from vibrokit.results.sweep import Sweep, touches_text
 from vibrokit.text_table import number_text, power_text
 from vibrokit.text_units import familiar, symbol_text, unit_text
 
@@ -108,11 +108,16 @@ def rate_table(result: Result) -> Table:
 
 
 def coexistence_table(sweep: Sweep) -> Table:
-    """Return from where to where each branch of a sweep exists, a row for each stretch without a gap."""
+    """Return from where to where each branch of a sweep exists, a row for each stretch with the same contacts."""
     label, scale = sweep.axis()
-    rows = tuple((one.name, f"{one.first / scale:.8g}", one.begins, f"{one.last / scale:.8g}", one.ends)
-                 for one in sweep.coexistence)  # fmt: skip
-    header = ("state", "from", "begins by", "to", "ends by")
+    rows = tuple(
+        (
+            one.name, f"{one.first / scale:.8g}", one.begins, f"{one.last / scale:.8g}", one.ends,
+            *([touches_text(one)] if sweep.stops else []),
+        )
+        for one in sweep.coexistence
+    )  # fmt: skip
+    header = ("state", "from", "begins by", "to", "ends by", *(["contact"] if sweep.stops else []))
     return Table("coexistence", f"Steady states along {label}", header, rows)
 
 

@@ -120,6 +120,11 @@ class Attractor:
         return sum(self.hits.values())
 
     @property
+    def touched(self) -> tuple[str, ...]:
+        """Sides of the stops that it touches, in alphabetical order."""
+        return tuple(sorted(side for side, depth in self.peak_depth.items() if depth > 0))
+
+    @property
     def extent(self) -> NDArray[np.float64]:
         """Array (2, 2): least and largest x, least and largest v along the orbit."""
         return np.stack([self.orbit.min(axis=0), self.orbit.max(axis=0)], axis=1)

@@ -43,6 +43,7 @@ class SteadyStates:
     findings: Annotated[tuple[Finding, ...], "what was found and what was not, or why nothing was found"] = ()
 
 
+GRAZING = "grazing"
 _KIND = Word(
     '"fold", where the branch turns back; "pitchfork or transcritical", where another branch crosses it; "period '
     'doubling", "Neimark–Sacker", "Hopf"; "grazing", where one more turn of the orbit touches a stop, leaves it or '
@@ -119,7 +120,9 @@ class Continuation(AlongParameter):
 
     region: Annotated[Region | None, "what basin fractions are shares of at all values; None if nothing was found"]
     states: Annotated[tuple[SteadyStates, ...], "one for each value, in ascending order"]
-    branch_names: Annotated[tuple[str, ...], "name of each branch, that of its first attractor"]
+    branch_names: Annotated[
+        tuple[str, ...], "name of each branch: that of its first attractor, or of all that differ in contact"
+    ]
     bifurcations: Annotated[tuple[Bifurcation, ...], "in ascending order of the value"] = ()
 
     @property

@@ -40,7 +40,19 @@ def names_of(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[str, 
     ``left-``, ``middle-`` and ``right-`` by place if that differs by a tenth of their width. Where neither
     distinguishes them, or where there are more, all but the first are numbered.
     """
-    bases = [_base(attractor, has_stops) for attractor in attractors]
+    return _distinct([_base(attractor, has_stops) for attractor in attractors], attractors)
+
+
+def branch_names_of(branches: Sequence[Sequence[Attractor]], *, has_stops: bool) -> tuple[str, ...]:
+    """Return a short, distinct name for each branch, that of its first attractor; each has one or more.
+
+    A branch that touches a stop in one part and not in another, or hits it in one and stays in contact in another, has
+    the names of all: ``clear-and-hammering``.
+    """
+    return _distinct([_base_of_branch(branch, has_stops) for branch in branches], [branch[0] for branch in branches])
+
+
+def _distinct(bases: Sequence[str], attractors: Sequence[Attractor]) -> tuple[str, ...]:
     names = list(bases)
     for base in dict.fromkeys(bases):
         group = [index for index, name in enumerate(bases) if name == base]
@@ -53,22 +65,39 @@ def names_of(attractors: Sequence[Attractor], *, has_stops: bool) -> tuple[str, 
 
 
 def _base(attractor: Attractor, has_stops: bool) -> str:
+    return _motion(attractor, has_stops) + _repetition(attractor)
+
+
+def _base_of_branch(branch: Sequence[Attractor], has_stops: bool) -> str:
+    first = _motion(branch[0], has_stops)
+    if first not in ("clear", "rest", "pressed", "hammering"):  # says nothing of stops
+        return first + _repetition(branch[0])
+    firsts: dict[tuple[bool, bool], Attractor] = {}
+    for attractor in branch:
+        firsts.setdefault((bool(attractor.touched), attractor.impacts > 0), attractor)
+    words = dict.fromkeys(_motion(one, has_stops) for one in firsts.values())
+    return "-and-".join(words) + _repetition(branch[0])
+
+
+def _motion(attractor: Attractor, has_stops: bool) -> str:
+    """What it does, without its period."""
     if attractor.kind in ("quasiperiodic", "chaotic"):
         return attractor.kind
     if attractor.turns:
         often = abs(attractor.turns) / attractor.period
-        name = "running" if often <= 1 else f"running-{often:.3g}-turns"
-        return name if attractor.period == 1 else f"{name}-period-{attractor.period}"
+        return "running" if often <= 1 else f"running-{often:.3g}-turns"
     if attractor.kind == "limit cycle":
         return "cycle"
-    touches = any(depth > 0 for depth in attractor.peak_depth.values())
-    if touches and not attractor.impacts:
-        motion = "pressed"
-    elif attractor.kind == "equilibrium":
-        motion = "rest"
-    else:
-        motion = "oscillation" if not has_stops else "hammering" if attractor.impacts else "clear"
-    return motion if attractor.period == 1 else f"{motion}-period-{attractor.period}"
+    if attractor.touched and not attractor.impacts:
+        return "pressed"
+    if attractor.kind == "equilibrium":
+        return "rest"
+    return "oscillation" if not has_stops else "hammering" if attractor.impacts else "clear"
+
+
+def _repetition(attractor: Attractor) -> str:
+    """Its period, if that is not 1."""
+    return f"-period-{attractor.period}" if attractor.repeats and attractor.period != 1 else ""
 
 
 def _distinguishing(group: Sequence[Attractor]) -> tuple[str, ...]:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from vibrokit.errors import VibrokitError
+from vibrokit.results.continuation import GRAZING
 from vibrokit.structure.tracing.families import FOLD, HOPF, TORUS, Family, Member
 from vibrokit.structure.tracing.turns import NEXT_TO, Surface, surfaces_of, turns_at
 
-GRAZING = "grazing"
 _CROSSING = "pitchfork or transcritical"
 _JUST_AHEAD = 1e-3  # in units of the span: how far ahead a grazing may lie, and how far back an extrapolation begins
 _SHARP = 1e-13  # fraction of a step that roots are found to

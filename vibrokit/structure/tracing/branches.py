@@ -16,14 +16,14 @@ from vibrokit.errors import StructureError, VibrokitError
 from vibrokit.progress import advance, stage
 from vibrokit.results.attractor import Attractor
 from vibrokit.results.codes import Code
-from vibrokit.results.continuation import Bifurcation
+from vibrokit.results.continuation import GRAZING, Bifurcation
 from vibrokit.results.finding import Finding
 from vibrokit.structure.attractors.describe import describe_orbit
-from vibrokit.structure.attractors.names import names_of
+from vibrokit.structure.attractors.names import branch_names_of
 from vibrokit.structure.autonomous import Cycle
 from vibrokit.structure.linear_map import linear_map
 from vibrokit.structure.orbits import SAMPLES, Orbit, refine_orbit, visited
-from vibrokit.structure.tracing.bifurcations import GRAZING, Located
+from vibrokit.structure.tracing.bifurcations import Located
 from vibrokit.structure.tracing.families import DOUBLING, Member
 from vibrokit.structure.tracing.following import Follower
 
@@ -178,12 +178,13 @@ class Tracing:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the branches, from the first attractor of each."""
-        first: dict[int, Attractor] = {}
+        """Names of the branches."""
+        members: dict[int, list[Attractor]] = {}
         for attractors, branches in zip(self.found, self.numbered, strict=True):
             for attractor, branch in zip(attractors, branches, strict=True):
-                first.setdefault(branch, attractor)
-        return names_of([first[branch] for branch in sorted(first)], has_stops=bool(self.follower.osc.barriers))
+                members.setdefault(branch, []).append(attractor)
+        own = [members[branch] for branch in sorted(members)]
+        return branch_names_of(own, has_stops=bool(self.follower.osc.barriers))
 
     @cached_property
     def bifurcations(self) -> tuple[Bifurcation, ...]:
