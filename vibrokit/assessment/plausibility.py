@@ -227,8 +227,8 @@ def _always_touching(osc: Oscillator, response: LinearResponse) -> Iterator[Oddi
     reaches = {"left": response.left, "right": response.right}
     gaps = {barrier.side: barrier.sign * (barrier.position - response.rest) for barrier in osc.barriers}
     ratios = {side: reaches[side] / gap for side, gap in gaps.items() if gap > 0}
-    side = max(ratios, key=lambda one: ratios[one], default="")
-    if side and ratios[side] > _BEYOND:
+    side = max(ratios, key=lambda one: ratios[one], default=None)
+    if side is not None and ratios[side] > _BEYOND:
         yield Oddity(OddityCode.NO_CLEAR_STATE, {"side": side, "ratio": ratios[side]})
 
 
