@@ -65,7 +65,7 @@ print(result.status)
 
 # %%
 # Each energy has bounds. The upper bound is the action of a path from the attractor to the
-# exit. The lower bound is the value below which the graph search excludes any path.
+# exit. Below the lower bound the graph search found no path, within its error.
 
 clear = result.energy("clear", "hammering")
 for e in result.energies:
@@ -114,8 +114,8 @@ print(f"numerical error of the path {clear.numerical_error:.0e}")
 print(f"distance of the bounds      {clear.upper - clear.lower:.0e}")
 
 # %%
-# The path ends on the saddle with zero momentum. From there the motion without noise leads
-# to either state.
+# The path ends on the saddle with zero momentum. From next to it, the motion without
+# noise leads to one state or the other.
 
 (saddle,) = structure.saddles
 arrival = np.linalg.norm(clear.path.q[-1] - saddle.points[0])
@@ -192,8 +192,8 @@ print(transitions.stationary_weights(intensity))
 
 # %%
 # The quasi-potential is the least action from the clear-running state to each point of the
-# section. It is a smooth bowl near the state, and has folds where paths with different
-# histories meet.
+# section. It is a smooth bowl near the state, and has kinks where two paths with
+# different histories cost the same.
 
 fig, ax = plt.subplots(layout="constrained")
 result.plot_quasi_potential("clear", ax=ax)
