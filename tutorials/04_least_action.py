@@ -65,7 +65,7 @@ print(result.status)
 
 # %%
 # Each energy has bounds. The upper bound is the action of a path from the attractor to the
-# exit. Below the lower bound the graph search found no path, within its error.
+# exit. Below the lower bound the graph search found no path, within its estimated error.
 
 clear = result.energy("clear", "hammering")
 for e in result.energies:
@@ -107,15 +107,16 @@ print(f"                     by stepper  {certificate.by_stepper:.0e}")
 
 # %%
 # The certificate shows that the path is an extremal and how accurate its action is. It
-# does not exclude a cheaper path. The bounds do, so that they are much wider apart than
-# the numerical error of the path.
+# does not exclude a cheaper path. The lower bound does, within the estimated error of the
+# graph search. The bounds are therefore much wider apart than the numerical error of the
+# path.
 
 print(f"numerical error of the path {clear.numerical_error:.0e}")
 print(f"distance of the bounds      {clear.upper - clear.lower:.0e}")
 
 # %%
-# The path ends on the saddle with zero momentum. From next to it, the motion without
-# noise leads to one state or the other.
+# The path ends on the saddle with zero momentum. From next to it, the motion without noise
+# leads to one state or the other.
 
 (saddle,) = structure.saddles
 arrival = np.linalg.norm(clear.path.q[-1] - saddle.points[0])
@@ -192,8 +193,8 @@ print(transitions.stationary_weights(intensity))
 
 # %%
 # The quasi-potential is the least action from the clear-running state to each point of the
-# section. It is a smooth bowl near the state, and has kinks where two paths with
-# different histories cost the same.
+# section. It is a smooth bowl near the state, and has kinks where two paths with different
+# histories cost the same.
 
 fig, ax = plt.subplots(layout="constrained")
 result.plot_quasi_potential("clear", ax=ax)
@@ -204,7 +205,8 @@ result.plot_quasi_potential("clear", ax=ax)
 #
 # * The energy of the double well agrees with :math:`4\zeta\omega_n` times its barrier, and
 #   that of the first contact with its closed form.
-# * A certified path is an extremal; the bounds of its energy show what the search excludes.
+# * A certified path is an extremal. The lower bound of its energy rests on the graph search
+#   and its estimated error.
 # * The clear-running state has the smaller energy: it is left first.
 #
 # :doc:`/how-to/least-action` has the settings. The next tutorial, :doc:`05_densities`,

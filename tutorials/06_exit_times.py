@@ -32,8 +32,8 @@ import vibrokit as vk
 # The well is that of the previous tutorial, with the activation energy
 # :math:`4\zeta\omega_n \times 1/4 = 0.2`. Walkers start in the core of the left well, an
 # ellipse of one standard deviation around its equilibrium. They have left when they reach
-# the core of the right well. This event is called *commitment*. Crossing the
-# basin boundary is not sufficient: half of the walkers there turn back.
+# the core of the right well. This event is called *commitment*. Crossing the basin boundary
+# is not sufficient: half of the walkers there turn back.
 #
 # A relative standard error of :math:`1/\sqrt n` needs n exits, 400 for the default of 5 %.
 # ``splitting=False`` requires direct simulation at each intensity. ``escapes=20`` keeps
@@ -107,13 +107,14 @@ print(f"exact {exact:.3f}")
 
 # %%
 # Kramers' formula has the prefactor as well, for weak noise and moderate or strong damping.
-# The correction of first order in D depends on the damping. Its overdamped value is a ratio
-# of integrals; at :math:`\zeta = 0.2` it is up to twice too large. The whole correction is
-# taken as the error.
+# The correction of first order in D depends on the damping. In the overdamped limit the
+# rate is a ratio of integrals, and the correction follows from it. At ζ = 0.2 this
+# correction is too large, by a factor of up to 2 at the intensities of this page. The whole
+# correction is taken as the error.
 
 
 def kramers(intensity):
-    """Return ln of the rate by Kramers' formula with its correction, and the error."""
+    """Return ln of the rate by Kramers' formula, corrected, and the error."""
     temperature = intensity / (4 * zeta)
 
     def in_the_well(x):
