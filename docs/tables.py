@@ -11,14 +11,14 @@ import io
 import math
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 Row = dict[str, str]
 Page = list[str]
 
 COMMENT = "# "
-EXACT_BOUNDS = ("certified", "exact")  # bounds on both sides that are narrower than what a search excludes
+EXACT_BOUNDS = ("certified", "exact")  # two-sided bounds
 FEWEST_DIGITS, MOST_DIGITS = 5, 10
 WIDTH = 120
 PAPER, OTHER = "Scenes of the paper", "Other scenes"
@@ -41,10 +41,6 @@ class Table:
         machine = f"; {self.comments['machine']}" if "machine" in self.comments else ""
         return f"``{self.comments['command']}`` → :download:`{name} <data/{name}>`{machine}"
 
-    @property
-    def machine(self) -> str:
-        return self.comments["machine"]
-
 
 def read(path: Path) -> Table:
     """Read a CSV file; comments are lines such as ``# command: …``."""
@@ -66,49 +62,48 @@ def write(docs: Path) -> None:
 
 def validation(docs: Path) -> None:
     """The page of comparisons with closed forms, published values and other programs."""
-    page = _section(
+    _write(
+        docs / "validation.rst",
         "Validation",
         "Each table compares numbers of vibrokit with closed forms, published values or results of other "
         "programs. The command above a table writes the CSV file of which the table is made. Energies are in m² "
         "s⁻³.",
-        line="=",
+        (_public_cases, _extremes, _gallery_exact, _published, _independent, _spectrum),
     )
-    for section in (_public_cases, _extremes, _gallery_exact, _published, _independent, _spectrum):
-        page += section(docs / "data")
-    _save(docs / "validation.rst", page)
 
 
 def performance(docs: Path) -> None:
     """The page of computing times."""
-    page = _section(
+    _write(
+        docs / "performance.rst",
         "Performance",
         "The contestants of a race run one after another in each round, and a ratio compares times of the same "
         "round: its median stands before the quartiles. The command above a table writes the CSV file of which the "
         "table is made, on the machine that stands beside it.",
-        line="=",
+        (_analyzers, _steppers, _located, _races, _compilation),
     )
-    for section in (_analyzers, _steppers, _located, _races, _compilation):
-        page += section(docs / "data")
-    _save(docs / "performance.rst", page)
 
 
 def barriers(docs: Path) -> None:
     """The page of energies, one row for each exit."""
-    page = _section(
+    _write(
+        docs / "barriers.rst",
         "Computed barriers",
         "Activation energies ΔU (m² s⁻³) of the scenes that the tests use as references, one row for each exit. "
         "Download the file of a scene and run ``vibrokit run FILE.toml`` to compute its rows, or ``vibrokit run "
         "FILE.toml --exit first-contact`` where the target is a stop. ``lower`` and ``upper`` are bounds of ΔU; "
-        "``bound`` states what they are based on (:doc:`how-to/least-action`). The error is that of the "
+        "``bound`` names their basis (:doc:`how-to/least-action`). The error is that of the "
         "certificate, relative to ΔU; rows without one have no certified path. A value behind ≤ is an upper "
         "bound.",
-        line="=",
+        (_energies,),
     )
-    if table := _table(docs / "data", "gallery"):
-        page += [table.source, ""]
-        for title, rows in _by_kind(table.rows).items():
-            page += _section(title, "") + _barrier_rows(rows)
-    _save(docs / "barriers.rst", page)
+
+
+def _write(path: Path, title: str, text: str, sections: Sequence[Callable[[Path], Page]]) -> None:
+    page = _section(title, text, line="=")
+    for section in sections:
+        page += section(path.parent / "data")
+    path.write_text("\n".join(page).rstrip("\n") + "\n", encoding="utf-8")
 
 
 # --- sections of the validation
@@ -387,6 +382,15 @@ def _compilation(data: Path) -> Page:
 # --- rows of energies
 
 
+def _energies(data: Path) -> Page:
+    if not (table := _table(data, "gallery")):
+        return []
+    page = [table.source, ""]
+    for title, rows in _by_kind(table.rows).items():
+        page += _section(title, "") + _barrier_rows(rows)
+    return page
+
+
 def _by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
     """Rows with an energy: those of the scenes of the paper, and the others."""
     kinds: dict[str, list[Row]] = {PAPER: [], OTHER: []}
@@ -496,7 +500,3 @@ def _digits(text: str, digits: int) -> str:
         return f"{float(text):.{digits}g}"
     except ValueError:
         return text
-
-
-def _save(path: Path, page: Page) -> None:
-    path.write_text("\n".join(page).rstrip("\n") + "\n", encoding="utf-8")

@@ -1,6 +1,6 @@
 """
-What the system does without noise
-==================================
+Steady states without noise
+===========================
 
 **Question:** Which steady states does a scene have, which starts lead to each of them, and
 what separates them?

@@ -12,6 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from vibrokit.errors import NoSectionError
 from vibrokit.oscillator import Oscillator
+from vibrokit.parts.barrier import Barrier
 from vibrokit.structure.one_variable import Tone, bracketed_roots, tones
 from vibrokit.symbolic.numeric import amplitude_at, drift_at, excitation_of, jacobian_of
 
@@ -31,6 +32,14 @@ class LinearResponse:
     right: float
     speed: float  # largest of the forced motion (m s⁻¹)
     noise: float  # standard deviation of x by noise (m); NaN without noise, and where it is not bounded or varies
+
+    def reach(self, side: str) -> float:
+        """Largest forced displacement towards a stop (m)."""
+        return self.right if side == "right" else self.left
+
+    def gap(self, barrier: Barrier) -> float:
+        """Distance from the rest to a stop (m); negative where the rest is inside."""
+        return barrier.sign * (barrier.position - self.rest)
 
 
 def linear_response(osc: Oscillator) -> LinearResponse | None:

@@ -171,7 +171,7 @@ def _noise(osc: Oscillator, response: LinearResponse | None) -> Iterator[Row]:
 
 
 def _stop(osc: Oscillator, response: LinearResponse, index: int, barrier: Barrier) -> Iterator[Row | Oddity]:
-    side, gap = barrier.side, barrier.sign * (barrier.position - response.rest)
+    side, gap = barrier.side, response.gap(barrier)
     natural = math.sqrt(response.stiffness)
     if gap < 0:
         clear = barrier.sign * (-barrier.position - response.rest) > 0
@@ -191,7 +191,7 @@ def _stop(osc: Oscillator, response: LinearResponse, index: int, barrier: Barrie
 
 def _reach(osc: Oscillator, response: LinearResponse, side: str, gap: float) -> Iterator[Row | Oddity]:
     """How far excitations and noise move the mass towards a stop."""
-    reach = response.right if side == "right" else response.left
+    reach = response.reach(side)
     if response.speed > 0:
         yield Row(Measure.AMPLITUDE_OVER_GAP, reach / gap, side)
         if reach > _FAR * gap:
@@ -224,9 +224,8 @@ def _always_touching(osc: Oscillator, response: LinearResponse) -> Iterator[Oddi
             return
     except NoSectionError:
         return
-    reaches = {"left": response.left, "right": response.right}
-    gaps = {barrier.side: barrier.sign * (barrier.position - response.rest) for barrier in osc.barriers}
-    ratios = {side: reaches[side] / gap for side, gap in gaps.items() if gap > 0}
+    clear = [stop for stop in osc.barriers if response.gap(stop) > 0]
+    ratios = {stop.side: response.reach(stop.side) / response.gap(stop) for stop in clear}
     side = max(ratios, key=lambda one: ratios[one], default=None)
     if side is not None and ratios[side] > _BEYOND:
         yield Oddity(OddityCode.NO_CLEAR_STATE, {"side": side, "ratio": ratios[side]})

@@ -16,11 +16,12 @@ from vibrokit.quantity import Quantity
 from vibrokit.report.blocks import Table
 from vibrokit.results.basins import ESCAPED
 from vibrokit.results.energy import ActivationEnergy
+from vibrokit.results.existence import touches_text
 from vibrokit.results.labels import goal_name
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
-from vibrokit.results.sweep import Sweep, touches_text
+from vibrokit.results.sweep import Sweep
 from vibrokit.text_table import number_text, power_text
 from vibrokit.text_units import familiar, symbol_text, unit_text
 

@@ -155,9 +155,8 @@ def _described(attractor: Attractor) -> str:
     """What the legend of a picture calls an attractor: name, kind or period, and stop hits."""
     kind = f"period {attractor.period}" if attractor.kind == "periodic" else attractor.kind
     hits = f"{attractor.impacts:.3g} hit{'s' if attractor.impacts != 1 else ''}" if attractor.impacts else "no hits"
-    pressed = sorted(side for side, depth in attractor.peak_depth.items() if depth > 0)
-    if pressed and not attractor.impacts:
-        hits = f"pressed on the {pressed[0]} stop"
+    if attractor.touched and not attractor.impacts:
+        hits = f"pressed on the {attractor.touched[0]} stop"
     per = "" if attractor.repeats or not attractor.impacts else " per period"
     return f"{attractor.name}: {kind}, {hits}{per}"
 

@@ -80,7 +80,7 @@ def _base_of_branch(branch: Sequence[Attractor], has_stops: bool) -> str:
 
 
 def _motion(attractor: Attractor, has_stops: bool) -> str:
-    """What it does, without its period."""
+    """The name of a motion, without its period."""
     if attractor.kind in ("quasiperiodic", "chaotic"):
         return attractor.kind
     if attractor.turns:
