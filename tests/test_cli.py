@@ -419,6 +419,18 @@ def test_equations(capsys):
     assert r"\dot{x}" in capsys.readouterr().out
 
 
+def test_plausibility(capsys):
+    natural, spectral = 1.0 / (2 * math.pi), 2 * 2e-5
+    assert main(["plausibility", "hertz-0.570"]) == 0
+    assert f"{natural:.4g} Hz" in capsys.readouterr().out
+    assert main(["plausibility", "hertz-0.570", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    values = {row["measure"]: row["value"] for row in found["rows"]}
+    assert values["natural-hz"] == pytest.approx(natural, rel=1e-12)
+    assert values["psd"] == pytest.approx(spectral, rel=1e-12)
+    assert found["oddities"] == []
+
+
 def test_settings_reach_the_parts_of_an_analyzer():
     given = dict(setting(text) for text in ("graph.nodes=48,64", "shooting=none", "orbits=2", "source=clear"))
     made = configured(vk.LeastAction, given)

@@ -21,6 +21,7 @@ from .analyzers.sgcm_wkb import SGCM as SGCM
 from .analyzers.shooting.shooting import Shooting as Shooting
 from .assessment.assess import assess as assess
 from .assessment.assessment import Assessment as Assessment
+from .assessment.plausibility import Measure as Measure
 from .assessment.plausibility import plausibility as plausibility
 from .assessment.sweep import sweep as sweep
 from .comparison.occupancies import occupancies as occupancies

@@ -1,6 +1,7 @@
 """Sweeps: states, energies and mean times along a parameter against closed forms, and files."""
 
 import dataclasses
+import json
 import math
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.scenes import scene
 from vibrokit.assessment.sweep import among_others
 from vibrokit.cli import main
 from vibrokit.errors import ParameterError, StructureError
+from vibrokit.report.data import sweep_data
 from vibrokit.report.tables import along_table, coexistence_table, gap_table
 from vibrokit.results.codes import Code
 from vibrokit.results.continuation import Bifurcation, SteadyStates
@@ -298,6 +300,21 @@ def test_bad_words_on_the_command_line(words, capsys):
     assert capsys.readouterr().err.startswith("vibrokit: ")
 
 
+def test_a_sweep_as_json(tmp_path, monkeypatch, capsys):
+    """States along the frequency; without paths no energies."""
+    monkeypatch.chdir(tmp_path)
+    words = "sweep hertz-0.570 frequency 0.56 0.57 --count 2 --states-only --json -o s.nc"
+    assert main(words.split()) == 0
+    found, saved = json.loads(capsys.readouterr().out), vk.load_result("s.nc")
+    assert found["values"] == [0.56, 0.57]
+    assert [one["name"] for one in found["branches"]] == list(saved.names)
+    assert [one["name"] for one in found["coexistence"]] == [one.name for one in saved.coexistence]
+    (hammering,) = [one for one in found["branches"] if one["name"] == "hammering"]
+    assert hammering["largest_x"] == saved.along("hammering")[1].tolist()
+    assert "energy" not in hammering
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["s.nc"]  # no figure
+
+
 @pytest.fixture(scope="module")
 def well():
     osc = vk.load_scene("double-well").replace({"noise.intensity": D})
@@ -316,6 +333,13 @@ def test_energies_and_mean_times_of_a_double_well(well):
         exact = [-double_well_rate(damping, D) for damping in DAMPING]
         # The prefactor is that of ΔU/D = 5, and the exact times are at ΔU/D from 4 to 6: it may vary as D does.
         assert np.all(np.abs(log_time - exact) < 2 * error + abs(np.log(np.array(DAMPING) / (5 * D))))
+
+
+@pytest.mark.slow
+def test_energies_of_a_sweep_as_json(well):
+    for branch in sweep_data(well)["branches"]:
+        assert branch["energy"] == pytest.approx(DAMPING, rel=1e-8)
+        assert branch["log_mean_time"] == well.log_mean_time(branch["name"])[0].tolist()
 
 
 @pytest.mark.slow

@@ -272,5 +272,5 @@ def test_an_orbit_whose_basin_is_far_smaller_than_its_core_has_no_share(analyzer
     assert float(found.sel(attractor="hammering")) > 0.98
     assert math.isnan(found.sel(attractor="hammering-period-3"))
     assert str(found["state"].sel(attractor="hammering-period-3").values) == "hammering"
-    assert "with hammering" in shares_text(found.expand_dims("intensity"))
+    assert "counted with hammering" in shares_text(found.expand_dims("intensity"))
     assert {Code.CORE_EXCEEDS_BASIN, Code.TARGET_EXCEEDS_BASIN} <= {finding.code for finding in result.findings}

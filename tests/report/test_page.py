@@ -17,6 +17,7 @@ from tests.report.page import Page
 from vibrokit.assessment.durations import duration_text
 from vibrokit.cli import main
 from vibrokit.errors import ArgumentError, FileError, StructureError, VibrokitError
+from vibrokit.report.answer import answer_sentences
 from vibrokit.report.material import gathered
 from vibrokit.results.finding import Finding
 from vibrokit.results.section import Section
@@ -44,6 +45,15 @@ def test_units_of_the_inputs_and_numbers_of_the_answer(assessment, report):
     times = sorted(map(assessment.mean_time, assessment.names), key=lambda time: -time.log_value)
     for sentence, time in zip(answer, times, strict=False):
         assert all(duration_text(log) in sentence for log in (time.log_value, time.log_lower, time.log_upper))
+
+
+def test_the_answer_says_when_no_state_runs_clear(assessment):
+    states = assessment.structure.attractors
+    assert [bool(state.touched) for state in states] == [False, True]
+    touching = dataclasses.replace(states[0], peak_depth=states[1].peak_depth)
+    structure = dataclasses.replace(assessment.structure, attractors=(touching, *states[1:]))
+    without = len(answer_sentences(assessment))
+    assert len(answer_sentences(dataclasses.replace(assessment, structure=structure))) == without + 1
 
 
 def test_equations_are_mathml(report):

@@ -216,8 +216,8 @@ class Assessment(Record):
         solved = intensity_for(self.evidence.mean_times(start, end), math.log(time), self.evidence.slope(start, end))
         if solved is None:
             raise StructureError(
-                f"no noise intensity is known at which {leaving} after {time:g} s on average; give more time, or one "
-                "nearer to those that were computed."
+                f"no noise intensity is known at which {leaving} after {time:g} s on average; give a larger time "
+                "limit, or a mean time nearer to the computed ones."
             )
         found, lower, upper = solved
         return AllowedIntensity(

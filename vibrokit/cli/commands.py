@@ -81,7 +81,7 @@ COMMANDS = (
             _argument("--states-only", action="store_true", help="no energies and mean times"),
             _SEED,
             _argument("--verbose", action="store_true", help="also each branch at each value, and every finding"),
-            _TIME_LIMIT,
+            _TIME_LIMIT, _JSON,
             _file("save the sweep (netCDF)"),
             _file("where to save the figure (default: SCENE-sweep.png)", "--figure"),
         ),
@@ -152,8 +152,13 @@ COMMANDS = (
         "was stopped before its end.",
     ),
     Command(
-        "equations", "toolkit:equations", "print the derived equations",
+        "equations", "scene:equations", "print the derived equations",
         (_SCENE, _argument("--latex", action="store_true", help="as LaTeX")),
+    ),
+    Command(
+        "plausibility", "scene:closed_forms",
+        "print closed forms of a scene, and which are unusual, to find wrong units at once",
+        (_SCENE, _argument("--json", action="store_true", help="print one JSON object")),
     ),
     Command("list", "listing:list_names", "list scenes, parts with their parameters, analyzers, exits and records"),
     Command(

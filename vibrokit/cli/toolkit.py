@@ -1,4 +1,4 @@
-"""vibrokit equations, check and trade: what the toolkit makes of a scene, a part, and this machine."""
+"""vibrokit check and trade: what the toolkit makes of a part, and of this machine."""
 
 from __future__ import annotations
 
@@ -18,12 +18,6 @@ from vibrokit.trade.assessments import measure_assessments
 from vibrokit.trade.basins import measure_basins
 from vibrokit.trade.methods import measure_densities, measure_energies, measure_exit_times
 from vibrokit.trade.steppers import measure_steppers
-
-
-def equations(options: argparse.Namespace) -> None:
-    """Print the derived equations of a scene."""
-    model = load_scene(options.scene).model
-    print(model.latex if options.latex else model)
 
 
 def check_part(options: argparse.Namespace) -> int:

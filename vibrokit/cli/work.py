@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from vibrokit.assessment.sweep import sweep
 from vibrokit.cli.long_work import Interrupts, check_targets, scene_stem, source_of
 from vibrokit.errors import ParameterError, shown
 from vibrokit.report.assessment import Question, assessment_data, assessment_text
+from vibrokit.report.data import sweep_data
 from vibrokit.report.text import record_text
 from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, reproduce
 from vibrokit.results.atomic import save_figure
@@ -55,13 +57,17 @@ def assess_scene(options: argparse.Namespace) -> int:
 def _print_assessment(options: argparse.Namespace, found: Assessment) -> None:
     question = Question(options.mean_time, options.within)
     if options.json:
-        data = {"scene": options.scene, **assessment_data(found, question), "versions": versions()}
-        print(json.dumps({**data, "seed": options.seed, "seconds": found.seconds}, allow_nan=False))
+        _print_json(options, assessment_data(found, question), found.seconds)
     else:
         print(assessment_text(f"{options.scene}: which state lasts, and how long", found, question))
         if options.output is not None:
             print(f"written: {options.output}")
     sys.stdout.flush()
+
+
+def _print_json(options: argparse.Namespace, data: dict[str, Any], seconds: float) -> None:
+    whole = {"scene": options.scene, **data, "versions": versions(), "seed": options.seed, "seconds": seconds}
+    print(json.dumps(whole, allow_nan=False))
 
 
 def sweep_scene(options: argparse.Namespace) -> int:
@@ -90,12 +96,16 @@ def sweep_scene(options: argparse.Namespace) -> int:
                 source=source_of(options.source), energies=not options.states_only, rng=options.seed,
                 search=[value / size for value, _ in searched] or None,
             )  # fmt: skip
-        print(record_text(f"{options.scene}: sweep", found, brief=not options.verbose))
         if options.output is not None:
             found.save(options.output)
-            print(f"written: {options.output}")
-        save_figure(found.plot(), picture)
-        print(f"figure: {picture}")
+        if options.json:
+            _print_json(options, sweep_data(found), found.seconds)
+        else:
+            print(record_text(f"{options.scene}: sweep", found, brief=not options.verbose))
+            if options.output is not None:
+                print(f"written: {options.output}")
+            save_figure(found.plot(), picture)
+            print(f"figure: {picture}")
         return interrupts.status(0 if found.complete else 1)
 
 

@@ -93,7 +93,7 @@ def shares_text(shares: xarray.DataArray) -> str:
 
 
 def _cell(share: float, lower: float, upper: float, state: str, name: str) -> str:
-    return f"{share:.4g} ({lower:.3g} to {upper:.3g})" if state == name else f"with {state}"
+    return f"{share:.4g} ({lower:.3g} to {upper:.3g})" if state == name else f"counted with {state}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ class Agreement(Sentenced):
     NOT_METASTABLE = (
         "not-metastable",
         "{one} and {other} cannot be compared in {what}, since source or target is no state of its own at these noise "
-        "intensities: {reason}. No rate describes such an exit: lower the noise intensity.",
+        "intensities: {reason}. Rates describe exits from metastable states only, which need a lower noise intensity.",
     )
     """At no common noise intensity are source and target both metastable."""
     EVENTS_DIFFER = (
@@ -114,7 +114,8 @@ class Verdict:
         if self.relaxations < METASTABLE:
             parts.append(f"it is left after {self.relaxations:.2g} relaxation times, below {METASTABLE:g}")
         if self.core_share < HELD:
-            parts.append(f"{self.core_share:.0%} of a core lies in its own basin, below {HELD:.0%}")
+            ellipse = "of the ellipse of one standard deviation about it lies in its own basin"
+            parts.append(f"{self.core_share:.0%} {ellipse}, below {HELD:.0%}")
         return " and ".join(parts) or "too few intensities are left"
 
 

@@ -32,6 +32,8 @@ def answer_sentences(one: Assessment) -> tuple[str, ...]:
         sentences.append(f"It drives the mass out of {'; out of '.join(others)}.{order}")
     if open_:
         sentences.append(f"It is not known how long the mass stays in {open_}.")
+    if all(state.touched for state in one.structure.attractors):
+        sentences.append("Every steady state that was found touches a stop: none runs clear.")
     return (*map(_in_prose, sentences), _trust(one))
 
 

@@ -121,7 +121,7 @@ def _shares(one: Assessment) -> list[Table | Sentences]:
     for share, name in zip(found, one.names, strict=True):
         state = str(share["state"].item())
         interval = f"({float(share['lower']):.2g} to {float(share['upper']):.2g})"
-        rows.append((name, f"{float(share):.3g} {interval}" if state == name else f"with {state}"))
+        rows.append((name, f"{float(share):.3g} {interval}" if state == name else f"counted with {state}"))
     time = float(found["log_escape_time"])
     until = f"Shares are of the time before motion escapes, after {duration_text(time)} on average."
     note = [Sentences((until,))] if math.isfinite(time) else []

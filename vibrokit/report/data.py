@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from vibrokit.assessment.plausibility import Plausibility
 from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.comparison.verdicts import exit_name
+from vibrokit.errors import StructureError
 from vibrokit.report.tables import noise_intensity
 from vibrokit.results.energy import ActivationEnergy
 from vibrokit.results.exit_rate import ExitRate
@@ -19,6 +22,7 @@ from vibrokit.results.finding import Finding
 from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
+from vibrokit.results.sweep import Sweep
 
 _ATTRACTOR = ("label", "name", "kind", "period", "impacts", "points", "basin_fraction", "basin_fraction_error")
 _SADDLE = ("period", "points", "multipliers", "kind", "leads_to", "embedded")
@@ -74,6 +78,44 @@ def reconciliation_data(one: Reconciliation) -> dict[str, Any]:
             "findings": findings_data("reconciliation", one.findings, one.names),
         }
     )
+
+
+def sweep_data(one: Sweep) -> dict[str, Any]:
+    """Return where states exist along the parameter (SI units), and what is known of each branch at each value."""
+    return plain(
+        {
+            "parameter": dict(one.factors),
+            "unit": one.unit,
+            "values": one.values,
+            "intensities": one.intensity,
+            "coexistence": [dataclasses.asdict(each) for each in one.coexistence],
+            "bifurcations": [_fields(each, ("kind", "value", "branch")) for each in one.states.bifurcations],
+            "branches": [_branch(one, name) for name in one.names],
+            "complete": one.complete,
+            "findings": findings_data("sweep", one.findings, one.names),
+            "settings": one.settings,
+        }
+    )
+
+
+def _branch(one: Sweep, name: str) -> dict[str, Any]:
+    """A branch of a sweep; without energies or mean times where none is known."""
+    low, high, push = one.along(name)
+    found: dict[str, Any] = {"name": name, "least_x": low, "largest_x": high, "push": push}
+    with contextlib.suppress(StructureError):
+        found["energy"] = one.energy(name)
+        found["log_mean_time"], found["log_mean_time_error"] = one.log_mean_time(name)
+    return found
+
+
+def plausibility_data(one: Plausibility) -> dict[str, Any]:
+    """Return the closed forms of a scene, and the sentences on those that are unusual."""
+    rows = [
+        {"measure": row.measure.value, "subject": row.subject, "value": row.value, "unit": row.measure.unit}
+        for row in one.rows
+    ]
+    oddities = [{"code": odd.code.value, "values": odd.values, "text": str(odd)} for odd in one.oddities]
+    return plain({"rows": rows, "oddities": oddities})
 
 
 def findings_data(record: str, findings: Iterable[Finding], names: Sequence[str] = ()) -> list[dict[str, Any]]:
