@@ -280,6 +280,7 @@ def test_a_sweep_without_paths_in_a_file_and_what_it_cannot_say(tmp_path):
     one.plot()
     for error, ask in (
         (StructureError, lambda: one.energy("clear")),
+        (StructureError, lambda: one.energy("nobody")),
         (StructureError, lambda: one.log_mean_time("nobody")),
         (ParameterError, lambda: one.plot(unit="furlong")),
     ):
@@ -328,6 +329,7 @@ def test_energies_and_mean_times_of_a_double_well(well):
     assert [(span.begins, span.ends) for span in well.coexistence] == [("goes on", "goes on")] * 2
     for name in ("left-rest", "right-rest"):
         np.testing.assert_allclose(well.energy(name), DAMPING, rtol=1e-8)
+        np.testing.assert_array_equal(well.energy(name[:2]), well.energy(name))
         np.testing.assert_allclose(well.sensitivity(name), 1.0, rtol=1e-6)
         log_time, error = well.log_mean_time(name)
         exact = [-double_well_rate(damping, D) for damping in DAMPING]

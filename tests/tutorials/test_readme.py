@@ -42,7 +42,7 @@ def from_scripts():
 
 WRITTEN = [page for page in sorted(DOCS.glob("**/*.rst")) if not made_by_the_build(page)]
 PAGES = [README, *(page for page in WRITTEN if page.parent != DOCS / "scenes")]
-QUICK = ("list", "equations", "check")  # commands of seconds at most; of the others the words are checked
+QUICK = ("list", "equations", "plausibility", "check")  # of the other commands the words are checked
 LONG = ("assess", "density", "exit-times", "least-action", "reconcile", "structure")  # their Python takes the longest
 
 

@@ -21,6 +21,7 @@ from vibrokit.results.energy_continuation import EnergyContinuation
 from vibrokit.results.existence import Existence, coexistence, touches_text
 from vibrokit.results.fields import LARGEST, Number, Word
 from vibrokit.results.files import nested, records_in
+from vibrokit.results.labels import label_of
 from vibrokit.results.record import Summary
 from vibrokit.results.table import Table
 
@@ -150,12 +151,14 @@ class Sweep(AlongParameter):
     def energy(self, source: str) -> Array:
         """Return the least action with which a state is left at each value (m² s⁻³), NaN where it is not known.
 
+        `source` is the name of a branch; the beginning of a name is enough if it is unique.
+
         Raises
         ------
         StructureError
-            No exit path of this state was found.
+            There is no such branch, or no exit path of this state was found.
         """
-        return self._exits.energy(source)
+        return self._exits.energy(self._named(source))
 
     @called
     def sensitivity(self, source: str) -> Array:
@@ -163,7 +166,10 @@ class Sweep(AlongParameter):
 
         Parameters that are tied change together.
         """
-        return self._exits.sensitivity(source)
+        return self._exits.sensitivity(self._named(source))
+
+    def _named(self, source: str) -> str:
+        return self.names[label_of(source, self.names, "branch")]
 
     @property
     def _exits(self) -> EnergyContinuation:
@@ -181,8 +187,9 @@ class Sweep(AlongParameter):
         Raises
         ------
         StructureError
-            No exit path of this state was found, or no prefactor is known.
+            There is no such branch, no exit path of this state was found, or no prefactor is known.
         """
+        source = self._named(source)
         own = [one for one in self.prefactors if one.source == source]
         if not own:
             raise StructureError(f"the sweep has no prefactor of the mean time of {source}; see its status.")
