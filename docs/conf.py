@@ -31,6 +31,7 @@ extensions = [
 ]
 exclude_patterns = ["_build", "scenes", "**/sg_execution_times.rst", "sg_execution_times.rst"]
 autodoc_member_order = "bysource"
+default_role = "py:obj"  # names in backticks of docstrings are links where the reference has them
 autodoc_typehints = "none"  # the numpydoc sections say it in words
 napoleon_google_docstring = False
 napoleon_custom_sections = ["For developers"]
