@@ -23,6 +23,7 @@ FEWEST_DIGITS, MOST_DIGITS = 5, 10
 WIDTH = 120
 PAPER, OTHER = "Scenes of the paper", "Other scenes"
 COUNTS = ("exits", "certified or exact", "closed forms", "within bounds", "largest difference")
+LEFT_OUT = ("=0.0001)", "=1e-08)", "=1e-12)", "both stops")  # contestants that the CSV file alone has, by their ends
 SHOWN = ("energy", "mean_time")  # questions of the public cases whose answers are listed one by one
 
 
@@ -273,8 +274,20 @@ def _analyzers(data: Path) -> Page:
         "intensity of the scene.",
         table,
     )
-    columns = ("analyzer", "source", "quantity", "value", "error", "seconds")
-    return page + _grid(columns, ([row[column] for column in columns] for row in table.rows))
+    sources = list(dict.fromkeys(row["source"] for row in table.rows))
+    of = {(row["analyzer"], row["source"]): row for row in table.rows}
+    rows = []
+    for row in table.rows:
+        if row["source"] == sources[0]:  # the structure, of all sources
+            rows.append((row["analyzer"], row["quantity"], row["value"], row["seconds"], "", ""))
+        elif row["source"] == sources[1]:
+            cells = [row["analyzer"], row["quantity"]]
+            for source in sources[1:]:
+                one = of[row["analyzer"], source]
+                cells += [f"{one['value']} ± {one['error']}", one["seconds"]]
+            rows.append(tuple(cells))
+    heads = [head for source in sources[1:] for head in (source, "seconds")]
+    return page + _grid(("analyzer", "quantity", *heads), rows)
 
 
 def _steppers(data: Path) -> Page:
@@ -319,6 +332,7 @@ def _located(data: Path) -> Page:
         (
             (f"``{name}``", of[flows[0], name]["error"], *(of[flow, name]["cost"] for flow in flows))
             for name in dict.fromkeys(row["contestant"] for row in table.rows)
+            if not name.endswith(LEFT_OUT)
         ),
     )
 
@@ -343,6 +357,8 @@ def _races(data: Path) -> Page:
     rows = []
     for table, quantity in tables:
         for row in table.rows:
+            if row["contestant"].endswith(LEFT_OUT):
+                continue
             what = quantity + (f", {row['attractor']}" if "attractor" in row else "")
             rows.append(
                 (
@@ -474,9 +490,8 @@ def _section(title: str, text: str, *tables: Table, line: str = "-") -> Page:
     page = [title, line * len(title), ""]
     if text:
         page += [*textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False), ""]
-    for table in tables:
-        page += [table.source, ""]
-    return page
+    lines = [f"| {table.source}" for table in tables] if len(tables) > 1 else [table.source for table in tables]
+    return [*page, *lines, ""] if lines else page
 
 
 def _grid(header: Sequence[str], rows: Iterable[Sequence[str]]) -> Page:

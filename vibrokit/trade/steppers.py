@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import statistics
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -205,7 +204,7 @@ def _first_calls(
 def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, reference: Array, seconds: float) -> TradeRow:
     errors = np.linalg.norm((osc.section_map(states, periods, stepper=stepper) - reference)[:, :2], axis=1)
     many = _as_many(osc, stepper, states, 0.1 * seconds)
-    together = _median_time(lambda: osc.section_map(many, 1, stepper=stepper), 0.7 * seconds)
+    together = _shortest_time(lambda: osc.section_map(many, 1, stepper=stepper), 0.7 * seconds)
     few, length = states[:8], 8
 
     def one_by_one() -> None:
@@ -213,7 +212,7 @@ def _row(osc: Oscillator, stepper: Stepper, states: Array, periods: int, referen
             record(osc, Flow.STATE, stepper, state, 0.0, osc.section_interval, length)
 
     one_by_one()
-    alone = _median_time(one_by_one, 0.3 * seconds)
+    alone = _shortest_time(one_by_one, 0.3 * seconds)
     return TradeRow(
         name=type(stepper).__name__,
         stepper=repr(stepper),
@@ -238,13 +237,14 @@ def _as_many(osc: Oscillator, stepper: Stepper, states: Array, seconds: float) -
         count *= 2
 
 
-def _median_time(work: Callable[[], object], seconds: float) -> float:
+def _shortest_time(work: Callable[[], object], seconds: float) -> float:
+    """The time of a run that no other program delayed."""
     times: list[float] = []
     while len(times) < 5 or (sum(times) < seconds and len(times) < 100):
         began = time.perf_counter()
         work()
         times.append(time.perf_counter() - began)
-    return statistics.median(times)
+    return min(times)
 
 
 def _fitted_order(rows: Sequence[TradeRow], all_rows: Sequence[TradeRow]) -> float:
