@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import long
+from tests.layers import long, slow
 from vibrokit.analyzers.paths.action_descent import descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
@@ -28,7 +28,7 @@ def descended(start, end, intervals, pieces):
 @pytest.mark.parametrize(
     ("start", "end", "intervals"),
     [
-        ((0.0, 0.55), (0.2, 0.3), 2), ((0.2, 0.5), (0.3, -0.3), 2),
+        slow((0.0, 0.55), (0.2, 0.3), 2), long((0.2, 0.5), (0.3, -0.3), 2),
         long((0.0, 0.55), (0.3, -0.3), 3), long((0.2, 0.5), (0.0, 0.6), 3),
     ],
 )  # fmt: skip

@@ -37,6 +37,7 @@ def domain(paper):
     return vk.ActionPlot(points=3000, source=0).run(*paper, progress=seen.append), seen
 
 
+@pytest.mark.slow
 def test_clear_state_is_near_what_the_paper_has_and_far_easier_to_leave(ring):
     result, _ = ring
     clear, hammering = (next(e for e in result.energies if e.source == label) for label in (0, 1))
@@ -52,6 +53,7 @@ def test_clear_state_is_near_what_the_paper_has_and_far_easier_to_leave(ring):
     assert result.complete
 
 
+@pytest.mark.slow
 def test_the_path_pays_its_action_and_starts_on_the_ring(paper, ring):
     osc, structure = paper
     energy = ring[0].energies[0]
@@ -93,6 +95,7 @@ def test_bad_settings(bad):
         vk.ActionPlot(**bad)
 
 
+@pytest.mark.slow
 def test_the_whole_domain_finds_no_worse_than_the_ring(ring, domain):
     result, _ = domain
     (energy,) = result.energies
@@ -114,6 +117,7 @@ def test_the_whole_domain_finds_no_worse_than_the_ring(ring, domain):
     assert refinement.values["change"] <= vk.ActionPlot().tolerance
 
 
+@pytest.mark.slow
 def test_all_distinct_paths_are_branches_and_the_best_is_the_energy(domain):
     result, _ = domain
     (found,) = result.found(Code.SHOTS)
@@ -145,6 +149,7 @@ def test_candidates_are_ranked_paths_on_the_grid_of_eighths(paper):
         assert np.linalg.norm(settled[0] - structure.attractors[1].points[0]) < 1e-3  # beyond the boundary
 
 
+@pytest.mark.slow
 def test_progress_counts_paths(domain, ring):
     shooting = [update for update in domain[1] if update.stage == "action plot"]
     counts = [update.done for update in shooting]

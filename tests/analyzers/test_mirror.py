@@ -8,7 +8,7 @@ import pytest
 import scipy.interpolate
 
 import vibrokit as vk
-from tests.layers import long
+from tests.layers import long, slow
 from vibrokit.analyzers.mirrored import mirrored
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.problem import ExitProblem
@@ -73,7 +73,7 @@ def test_the_second_well_has_the_mirror_image_of_the_quasi_potential(kind):
     np.testing.assert_allclose(found, wanted, rtol=0.05, atol=1e-4)
 
 
-@pytest.mark.parametrize("kind", ["forced", *OTHERS])
+@pytest.mark.parametrize("kind", ["forced", *map(slow, OTHERS)])
 def test_only_a_symmetric_scene_has_mirror_images(kind):
     osc, structure = wells(kind)
     labels = [Mirror(ExitProblem(osc, structure, one, vk.LeaveBasin())).image for one in structure.attractors]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
 from vibrokit.structure.linear_map import hamiltonian_map, joined
 
@@ -25,8 +26,8 @@ def one_by_one(propagator, lengths):
     )
 
 
-@pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-10), vk.RK4(256), vk.RK8(128)], ids=repr)
-@pytest.mark.parametrize("last", [None, 0.3])
+@pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-10), slow(vk.RK4(256)), vk.RK8(128)], ids=repr)
+@pytest.mark.parametrize("last", [slow(None), 0.3])
 def test_nodes_of_all_phases_are_carried_together(stepper, last):
     propagator = SegmentPropagator(OSC, stepper)
     found = propagator.extremal_from(POINTS, PHASES, last)

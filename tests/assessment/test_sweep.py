@@ -202,6 +202,7 @@ def test_linear_response_and_grazing_along_a_frequency_in_hertz():
     assert found.energies is None
 
 
+@pytest.mark.slow
 def test_both_gaps_together_with_values_at_which_the_scene_is_refused():
     """Motion that is clear of the stops does not know the gap; it grazes where that is its amplitude."""
     tied = {"barriers.0.position": 1.0, "barriers.1.position": -1.0}

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.layers import slow
 from tests.scenes import Coupled
 from vibrokit.errors import SceneError, StepperError
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
@@ -136,7 +137,7 @@ def test_short_times_between_the_stops(paper, stepper, duration):
     np.testing.assert_allclose(found, true, rtol=1e-8)
 
 
-@pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-12), vk.RK4(16384)], ids=lambda s: s.name)
+@pytest.mark.parametrize("stepper", [vk.FreeFlight(1e-12), slow(vk.RK4(16384))], ids=lambda s: s.name)
 def test_states_of_the_noise_have_a_covariance_too(stepper):
     osc = vk.Oscillator(natural_frequency=1.0, damping_ratio=0.3, noise=Coupled(intensity=1e-3, rate=9.0))
     matrix = np.array([[0.0, 1.0, 0.0], [-1.0, -0.6, 1.0], [0.0, 0.2, -9.0]])

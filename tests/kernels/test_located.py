@@ -9,6 +9,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.kernels.ensemble import Stop, advance_block
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.stopping import COMPLETED, DIVERGED, LEFT_REGION, STALLED
@@ -189,7 +190,7 @@ def test_law_that_would_pull_is_let_go(clamped):
 
 
 @pytest.mark.parametrize("stepper", [vk.Order8(1e-10), vk.FreeFlight(1e-10)], ids=lambda stepper: stepper.name)
-@pytest.mark.parametrize("left", [0.3, 0.02, 1e-3])
+@pytest.mark.parametrize("left", [slow(0.3), 0.02, slow(1e-3)])
 def test_law_that_pushes_again_before_release(stepper, left):
     """A mass flies out of a stop whose law would pull, is slowed down, and is pushed once more before it leaves.
 

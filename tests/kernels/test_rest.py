@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vibrokit as vk
-from tests.layers import long
+from tests.layers import long, slow
 from vibrokit.kernels.ensemble import run_ensemble
 from vibrokit.symbolic.flow_kind import Flow
 
@@ -32,8 +32,8 @@ def ball(stiffness, damping, side, adhesive=False):
         (1e4, 0.074355, "left", False),
         (1e6, 0.074355, "right", False),
         long(1e8, 0.074355, "left", False),
-        (1e6, 0.3, "left", True),
-        (1e6, 1.5, "right", False),
+        slow(1e6, 0.3, "left", True),
+        slow(1e6, 1.5, "right", False),
     ],
 )
 def test_ball_rests_at_the_depth_that_bears_its_weight(stepper, stiffness, damping, side, adhesive):
@@ -66,7 +66,7 @@ def test_structure_has_one_attractor_and_loses_no_start():
     np.testing.assert_allclose(rest.points, [[-GRAVITY / 1e6, 0.0]], rtol=1e-9, atol=1e-15)
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.1])
+@pytest.mark.parametrize("gap", [slow(0.0), 0.1])
 @pytest.mark.parametrize("left", ["dash", "hertz"])
 @pytest.mark.parametrize("right", ["dash", "hertz"])
 def test_motion_that_starts_at_rest_at_a_stop_goes_on_to_another(left, right, gap):

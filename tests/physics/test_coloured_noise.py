@@ -92,6 +92,7 @@ def test_the_table_has_every_analyzer():
     assert set(TABLE) == built_in
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, said in TABLE.items() if said.startswith("refused")])
 def test_what_is_refused_is_refused_with_the_sentence_of_the_table(name):
     osc = contact(vk.ColouredNoise(1e-3, 1.0))

@@ -8,6 +8,7 @@ import pytest
 import scipy.integrate
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.results.basins import AT_COPY, ESCAPED
 from vibrokit.results.codes import Code
 
@@ -52,7 +53,7 @@ def test_shots_find_the_escape():
     assert energy.value == pytest.approx(4 * DAMPING / 6, rel=1e-3)
 
 
-@pytest.mark.parametrize("push", [0.0, PUSH])
+@pytest.mark.parametrize("push", [slow(0.0), PUSH])
 def test_a_pendulum_has_one_rest_that_is_left_over_the_lower_barrier(push):
     osc, structure = pendulum(push)
     (rest,) = structure.attractors

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.analyzers.paths.local_potential import local_potential
 from vibrokit.structure.orbits import refine_orbit
 
@@ -40,7 +41,7 @@ def in_order(number):
 
 
 @pytest.mark.parametrize("stepper", STEPPERS, ids=lambda s: s.name)
-@pytest.mark.parametrize("damping", [0.01, 0.3, 1.0, 2.0])
+@pytest.mark.parametrize("damping", [0.01, slow(0.3), 1.0, slow(2.0)])
 def test_steady_state_and_multipliers(stepper, damping):
     osc = linear_scene(damping)
     exact = steady_state(damping)

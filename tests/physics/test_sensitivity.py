@@ -50,6 +50,7 @@ def test_a_tilted_double_well_without_forcing():
     )
 
 
+@pytest.mark.slow
 def test_the_first_contact_of_a_forced_linear_oscillator():
     """ΔU = 2ζω_n³ (b − max x)², on a face that moves with the stop."""
     values = {
@@ -73,6 +74,7 @@ def test_the_first_contact_of_a_forced_linear_oscillator():
     )
 
 
+@pytest.mark.slow
 def test_a_scene_given_by_stiffness_and_damping():
     """ΔU = cκ (b − f/κ)², the energy above with κ = ω_n² and c = 2ζω_n, by the numbers that the scene has."""
     stiffness, c, b, push = 1.7, 0.3, 0.5, 0.1

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import spsolve
 
 import vibrokit as vk
-from tests.layers import long
+from tests.layers import long, slow
 from tests.scenes import double_well
 from vibrokit.analyzers.paths import slow_relaxation
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
@@ -45,7 +45,7 @@ def rests(tilt):
     return np.sort(np.roots([1.0, 0.0, -1.0, -tilt]).real)
 
 
-@pytest.mark.parametrize("frequency", [0.3, 0.1, long(0.05)])
+@pytest.mark.parametrize("frequency", [0.3, slow(0.1), long(0.05)])
 def test_the_saddle_is_the_periodic_solution_of_a_boundary_value_problem(frequency):
     (saddle,) = structure(frequency).saddles
     period = 2 * math.pi / frequency

@@ -115,6 +115,7 @@ def test_a_limit_cycle_is_reached_wherever_it_is_met(margin):
     np.testing.assert_array_equal(basins.labels, (radius > 1).astype(int))
 
 
+@pytest.mark.slow
 def test_chaos_is_told_from_the_orbit_beside_it():
     """Ueda's oscillator, x″ + 0.1x′ + x³ = 12 cos t: a chaotic attractor, and a small orbit of period 1."""
     osc = scene(

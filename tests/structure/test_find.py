@@ -4,7 +4,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import vibrokit as vk
-from tests.layers import long
+from tests.layers import long, slow
 from tests.scenes import double_well, scene
 from vibrokit.errors import StructureError
 from vibrokit.results.basins import AT_COPY, ESCAPED, NOT_FOLLOWED, UNSETTLED, Basins
@@ -290,7 +290,7 @@ def speed_at_a_rigid_stop():
     return abs(fsolve(miss, [0.0, 4.0], xtol=1e-12)[1])
 
 
-@pytest.mark.parametrize("stiffness", [1e8, 1e12])
+@pytest.mark.parametrize("stiffness", [1e8, slow(1e12)])
 def test_the_shortest_contacts_are_counted(stiffness):
     """A mass that bounces on one stop: as often and as fast, however short the contacts are."""
     changes = {f"barriers.{stop}.law.stiffness": stiffness for stop in (0, 1)}

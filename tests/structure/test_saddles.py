@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import vibrokit as vk
+from tests.layers import slow
 from tests.scenes import Coloured, double_well, scene
 from tests.structure.stable import stable_orbits
 from vibrokit.kernels.choice import ensemble_stepper, single_stepper
@@ -249,7 +250,7 @@ def test_one_basin_has_no_boundary():
     assert (finding.code, finding.values["count"]) == (Code.SADDLES, 0)
 
 
-@pytest.mark.parametrize(("amplitude", "wound"), [(0.05, False), (0.1, True)])
+@pytest.mark.parametrize(("amplitude", "wound"), [slow(0.05, False), (0.1, True)])
 def test_the_boundary_is_chaotic_above_melnikovs_amplitude(amplitude, wound):
     # x″ + δ x′ − x + x³ = γ cos ωt: the hilltop's manifolds cross, and the boundary is fractal, for
     # γ > 4 δ cosh(πω/2) / (3 √2 π ω) (Moon and Holmes, 1979); to first order in δ and γ.

@@ -95,7 +95,10 @@ WELLS = {
 }
 
 
-@pytest.mark.parametrize(("spring", "stops", "barrier"), WELLS.values(), ids=WELLS)
+@pytest.mark.parametrize(
+    ("spring", "stops", "barrier"),
+    [pytest.param(*well, id=name, marks=[pytest.mark.slow] * (name == "Hertz")) for name, well in WELLS.items()],
+)
 def test_wells_by_hand(spring, stops, barrier):
     scene = vk.Oscillator(
         natural_frequency=1.0, damping_ratio=0.05, spring=spring, barriers=stops, noise=vk.WhiteNoise(1e-3)

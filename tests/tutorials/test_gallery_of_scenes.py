@@ -9,7 +9,6 @@ import pytest
 
 SCENES = Path(__file__).parents[2] / "docs/scenes"
 SCRIPTS = sorted(SCENES.glob("*.py"))
-QUICK = ("bouncing_ball", "ueda")
 LONG = ("grazing_chaos", "heat_exchanger_tube", "paper_scene")  # the manual runs them, too
 LIBRARIES = {"math", "matplotlib", "numpy", "vibrokit"}
 
@@ -17,7 +16,7 @@ LIBRARIES = {"math", "matplotlib", "numpy", "vibrokit"}
 def layered(path):
     """A script in the layer that it belongs to."""
     mark = pytest.mark.long if path.stem in LONG else pytest.mark.slow
-    return pytest.param(path, id=path.stem, marks=[] if path.stem in QUICK else [mark])
+    return pytest.param(path, id=path.stem, marks=mark)
 
 
 @pytest.mark.parametrize("path", [layered(path) for path in SCRIPTS])
@@ -52,4 +51,3 @@ def test_a_page_has_a_title_parts_of_a_scene_and_a_check(path):
 def test_the_gallery_has_a_header_and_scenes():
     assert (SCENES / "GALLERY_HEADER.rst").read_text(encoding="utf-8").startswith("Gallery of scenes\n===")
     assert len(SCRIPTS) >= 12
-    assert set(QUICK) <= {path.stem for path in SCRIPTS}

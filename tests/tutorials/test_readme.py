@@ -162,7 +162,14 @@ def test_readme_has_ten_lines():
     assert len(first.splitlines()) == 10
 
 
-@pytest.mark.parametrize("line", sorted({shlex.join(words) for page in PAGES for words in commands(page)}))
+def layered(line):
+    """A command in the layer that it belongs to."""
+    return pytest.param(line, marks=[pytest.mark.slow] * line.startswith("vibrokit check "))
+
+
+@pytest.mark.parametrize(
+    "line", map(layered, sorted({shlex.join(words) for page in PAGES for words in commands(page)}))
+)
 def test_commands_do_what_they_say(line, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     program, *words = shlex.split(line)
@@ -204,11 +211,16 @@ def test_toml_snippets_are_read(page, tmp_path):
             osc = vk.load_scene(path)
             rest = [[0.0] * len(osc.model.state)]
             assert osc.section_map(rest).shape == (1, len(osc.model.state))
-            if page == DOCS / "how-to/command-line.rst":  # a steady state runs clear of the stop, and one hammers it
-                found = vk.find_structure(osc, cells=(20, 20), rng=0)
-                assert [state.impacts for state in found.attractors] == [0, 2]
         else:
             assert set(data) <= {"project", "barriers", "excitations", "spring", "friction", "noise"}
+
+
+@pytest.mark.slow
+def test_the_scene_of_the_command_line_has_a_clear_and_a_hammering_state(tmp_path):
+    (snippet,) = snippets(DOCS / "how-to/command-line.rst", "toml")
+    (tmp_path / "one-stop.toml").write_text(snippet, encoding="utf-8")
+    found = vk.find_structure(vk.load_scene(tmp_path / "one-stop.toml"), cells=(20, 20), rng=0)
+    assert [state.impacts for state in found.attractors] == [0, 2]
 
 
 def test_files_that_the_readme_names_exist():

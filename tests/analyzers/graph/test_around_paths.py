@@ -59,6 +59,7 @@ def steps():
     return STEPS * 2 ** doublings_of(problem().scene)
 
 
+@pytest.mark.slow
 def test_the_first_grids_hold_the_path_and_hardly_more():
     grids = coverage().first(steps(), NODES, 1)
     (path,) = {id(branch.path): branch.path for branch in branches()}.values()

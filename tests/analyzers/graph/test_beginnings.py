@@ -30,6 +30,7 @@ def potential(problem):
     return GRAPH.search(problem).potential
 
 
+@pytest.mark.slow
 def test_they_end_where_the_path_ends_and_cost_as_much(problem, potential, energy):
     found = beginnings(problem, potential, energy)
     assert found

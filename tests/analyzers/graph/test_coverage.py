@@ -59,6 +59,7 @@ def test_where_memory_is_short_fewer_nodes_are_taken():
     assert Code.GRAPH_MEMORY not in [each.code for each in fewer.findings]
 
 
+@pytest.mark.slow
 def test_sweeps_that_end_too_early_are_found(monkeypatch):
     search = vk.GraphSearch(nodes=(60, 60))
     enough = search.search(problem("cuts the basin"))
