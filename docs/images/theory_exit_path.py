@@ -41,7 +41,7 @@ left = energy.value - path.action
 history.semilogy(turns, path.action, color="C0", label="action $S$")
 history.semilogy(turns[left > 0], left[left > 0], color="C1", label=r"remaining action $\Delta U - S$")
 growth = -2 * np.log(np.abs(structure.attractors[0].multipliers).max())
-decay = 2 * np.abs(np.log(np.abs(saddle.multipliers))).min()
+decay = 2 * np.log(np.abs(saddle.multipliers).max())
 early = turns < 0.5 * turns[-1]
 late = (turns > 0.5 * turns[-1]) & (left > 1e-8 * energy.value)
 history.semilogy(turns[early], path.action[0] * np.exp(growth * turns[early]), "k--", linewidth=0.8)
