@@ -28,11 +28,11 @@ import vibrokit as vk
 # ----------------------------
 #
 # Let E be the energy per unit mass above the bottom of the well. The stationary density of
-# an unforced oscillator is Boltzmann's: :math:`p \propto e^{-4\zeta\omega_n E/D}`. At the
+# an unforced oscillator is Boltzmann's: :math:`\rho \propto e^{-4\zeta\omega_n E/D}`. At the
 # saddle of this well :math:`E = 1/4`. With :math:`\zeta = 0.2` and D = 0.004 the density
 # there is e⁻⁵⁰ of its maximum. It cannot be sampled: of 10²¹ independent samples about one
-# would lie near the saddle. ``SGCM`` stores ln p on a grid and carries it along the exact
-# flow, so that the error of ln p is small at any depth.
+# would lie near the saddle. ``SGCM`` stores ln ρ on a grid and carries it along the exact
+# flow, so that the error of ln ρ is small at any depth.
 
 zeta, barrier = 0.2, 0.25
 well = vk.load_scene("double-well").replace({"damping_ratio": zeta})
@@ -49,8 +49,8 @@ print("findings:", result.status or "none")
 # The density of one attractor is quasi-stationary: it describes the states that have not
 # left. ``StationaryDensity`` adds the densities of both wells, weighted by the
 # probabilities of the wells, which follow from the rates and are equal by symmetry. The
-# largest difference of ln p from Boltzmann's density, over all states below the barrier,
-# is a small fraction of the range of ln p.
+# largest difference of ln ρ from Boltzmann's density, over all states below the barrier,
+# is a small fraction of the range of ln ρ.
 
 stationary = vk.StationaryDensity.of(result)
 print(stationary)
@@ -66,10 +66,10 @@ for intensity, log_density in densities:
     difference = np.abs(log_density - boltzmann)[energy < barrier]
     misfits.append(float(difference.max()))
     depth = 4 * zeta * barrier / intensity
-    print(f"D = {intensity:g}: range of ln p {depth:.0f}, difference {misfits[-1]:.2f}")
+    print(f"D = {intensity:g}: range of ln ρ {depth:.0f}, difference {misfits[-1]:.2f}")
 
 # %%
-# The picture shows :math:`-D \ln p`, up to a constant. It has the shape of the energy E.
+# The picture shows :math:`-D \ln\rho`, up to a constant. It has the shape of the energy E.
 
 fig, ax = plt.subplots(layout="constrained")
 stationary.plot(ax=ax)

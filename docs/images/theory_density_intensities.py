@@ -15,20 +15,20 @@ ZETA, LEVELS = 0.2, (0.05, 0.025, 0.0125)
 
 
 def draw(result):
-    """Return a figure of −D ln p of the left well at v = 0, and of its barrier against D."""
+    """Return a figure of −D ln ρ of the left well at v = 0, and of its barrier against D."""
     figure = Figure(figsize=(10.5, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2)
     data = result.data.isel(source=0)
     x, v = data["density_x"].values, data["density_v"].values
     for place, level in enumerate(LEVELS):
         height = -level * data["log_density"].values[place][:, np.argmin(np.abs(v))]
-        left.plot(x, height - np.nanmin(height), label=f"−D ln p, D = {level:g}")
+        left.plot(x, height - np.nanmin(height), label=f"−D ln ρ, D = {level:g}")
     places = np.linspace(-2, 0, 200)
     exact = 4 * ZETA * (places**4 / 4 - places**2 / 2 + 0.25)
     left.plot(places, exact, "k--", linewidth=1.2, label="Ψ = 4ζω_n E")
     left.set(xlim=(-1.7, 0.6), ylim=(-0.01, 0.32), xlabel="x, at v = 0", ylabel="m² s⁻³")
     left.legend(frameon=False, fontsize=9)
-    right.plot(LEVELS, result.barrier("left-rest").values, "o", label="−D ln p, saddle less attractor")
+    right.plot(LEVELS, result.barrier("left-rest").values, "o", label="−D ln ρ, saddle less attractor")
     line = np.linspace(0, 0.055, 2)
     right.plot(line, 0.2 + line * math.log(2), "k--", linewidth=1.2, label="ΔU + D ln 2")
     right.axhline(0.2, color="0.6", linewidth=1)

@@ -21,7 +21,7 @@ def energy(arrow):
 
 
 def draw():
-    """Return a figure of the potential and of the W-graphs of its wells."""
+    """Return a figure of the potential and of the cheapest trees of its wells."""
     figure = Figure(figsize=(7.6, 5.0), layout="constrained")
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     x = np.linspace(-2.45, 2.45, 300)
@@ -39,7 +39,7 @@ def draw():
             below.annotate("", (end - shift, -row), (begin + shift, -row), arrowprops={"arrowstyle": "->"})
             below.annotate(f"{energy(arrow):.4f}", ((begin + end) / 2, -row), (0, 3), textcoords="offset points",
                            ha="center", fontsize=9)  # fmt: skip
-        below.annotate(f"$W_{root}$ = {sum(map(energy, arrows)):.4f}", (2.6, -row), va="center")
+        below.annotate(f"$S_\\mathrm{{{root}}}$ = {sum(map(energy, arrows)):.4f}", (2.6, -row), va="center")
     below.set(ylim=(-2.5, 0.7), xlim=(-2.6, 3.9), xlabel="x", yticks=[])
     return figure
 

@@ -38,8 +38,8 @@ if __name__ == "__main__":
     cost, motion, force = figure.subplots(1, 3)
     durations = np.geomspace(0.2, 12.0, 300)
     cost.plot(durations, [least_action(turns * TURN) for turns in durations], color="black")
-    cost.axhline(2 * ZETA, color="0.5", linestyle="--", label=r"$2\zeta\omega_n^3c^2$")
-    cost.set(xscale="log", yscale="log", xlabel=r"duration $\omega_n\tau/2\pi$", ylabel=r"least action $S(\tau)$")
+    cost.axhline(2 * ZETA, color="0.5", linestyle="--", label=r"$2\zeta\omega_n^3\ell^2$")
+    cost.set(xscale="log", yscale="log", xlabel=r"duration $t_1$ (turns)", ylabel=r"least action $S(t_1)$")
     cost.set(xticks=[0.25, 1, 3, 10], xticklabels=["1/4", "1", "3", "10"], yticks=[0.1, 0.2, 0.5, 1, 2])
     cost.set_yticklabels(["0.1", "0.2", "0.5", "1", "2"])
     cost.legend()
@@ -51,8 +51,8 @@ if __name__ == "__main__":
             axes.plot(
                 times / TURN - turns, values, color=colour, linewidth=1.2, label=f"{turns} turn{'s' * (turns > 1)}"
             )
-    motion.set(xlabel=r"turns before the end", ylabel=r"displacement $x/c$")
-    force.set(xlabel=r"turns before the end", ylabel=r"noise force $p_2/(\omega_n^2c)$")
+    motion.set(xlabel=r"turns before the end", ylabel=r"displacement $x/\ell$")
+    force.set(xlabel=r"turns before the end", ylabel=r"noise force $p_2/(\omega_n^2\ell)$")
     for axes in (motion, force):
         axes.set_xlim(-6.0, 0.1)
     motion.legend(loc="lower left")

@@ -9,11 +9,11 @@ from scipy.special import ndtr
 
 ZETA, INTENSITY = 0.2, 0.025
 DAMPING = 2 * ZETA
-GROWTH = math.sqrt(ZETA**2 + 1) - ZETA  # λ₊; the barrier of x⁴/4 − x²/2 has the curvature −1
+GROWTH = math.sqrt(ZETA**2 + 1) - ZETA  # λ_u; the barrier of x⁴/4 − x²/2 has the curvature −1
 
 
 def draw():
-    """Return a figure of f around the saddle, with levels of energy and the directions of the saddle."""
+    """Return a figure of η around the saddle, with levels of energy and the directions of the saddle."""
     figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     ax = figure.subplots()
     x, v = np.meshgrid(np.linspace(-1.5, 1.5, 301), np.linspace(-0.9, 0.9, 241))
@@ -22,7 +22,7 @@ def draw():
     picture = ax.contourf(x, v, share, np.linspace(0, 1, 11), cmap="RdYlBu", alpha=0.8)
     ax.contour(x, v, v**2 / 2 - x**2 / 2 + x**4 / 4, np.arange(-0.2, 0.3, 0.05), colors="0.35", linewidths=0.7,
                linestyles="solid")  # fmt: skip
-    for slope, name in ((GROWTH, "λ₊"), (-GROWTH - DAMPING, "λ₋")):
+    for slope, name in ((GROWTH, r"$\lambda_u$"), (-GROWTH - DAMPING, r"$\lambda_s$")):
         end = 0.55 / math.hypot(1, slope)
         for side in (1, -1):
             begin, stop = (0, 1) if slope > 0 else (1, 0)
@@ -31,12 +31,12 @@ def draw():
                         arrowprops={"arrowstyle": "->", "linewidth": 1.5})  # fmt: skip
         ax.annotate(name, (1.15 * end, 1.15 * end * slope))
     edge = np.linspace(-0.5, 0.5, 2)
-    ax.plot(edge, (GROWTH + DAMPING) * edge, "k--", linewidth=1.2, label="f = 1/2")
+    ax.plot(edge, (GROWTH + DAMPING) * edge, "k--", linewidth=1.2, label="η = 1/2")
     ax.plot([-1, 1], [0, 0], "o", color="k")
     ax.plot(0, 0, "x", color="k")
     ax.set(xlim=(-1.5, 1.5), ylim=(-0.9, 0.9), xlabel="x", ylabel="v")
     ax.legend(loc="upper left", frameon=False)
-    figure.colorbar(picture, ax=ax, label="f, share of the density that comes from the left")
+    figure.colorbar(picture, ax=ax, label="η, share of the density that comes from the left")
     return figure
 
 

@@ -29,7 +29,7 @@ def normal_moments(time, variances):
 
 
 def largest_errors(history):
-    """Of ln p down to 10 below the maximum, at each time."""
+    """Of ln ρ down to 10 below the maximum, at each time."""
     spacing = np.array([np.diff(history.x).mean(), np.diff(history.v).mean()])
     nodes = np.stack(np.meshgrid(history.x, history.v, indexing="ij"), axis=-1)
     errors = []

@@ -1,4 +1,4 @@
-"""Steps of ln p on a grid, where the answer is known in closed form."""
+"""Steps of ln ρ on a grid, where the answer is known in closed form."""
 
 import numpy as np
 import pytest

@@ -31,7 +31,7 @@ from vibrokit.scene_file import scene_data
 from vibrokit.structure.validation import check_means, gibibytes, plain
 from vibrokit.symbolic.flow_kind import Flow
 
-_DEPTH = 60.0  # in ln p below the maximum that is resolved
+_DEPTH = 60.0  # in ln ρ below the maximum that is resolved
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def evolve_density(
 ) -> DensityHistory:
     """Compute the probability density of the state at some times.
 
-    ln p is carried along the exact flow and diffuses in closed form, as in `SGCM`.
+    ln ρ is carried along the exact flow and diffuses in closed form, as in `SGCM`.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _flow(
 
 
 def _at(ends: list[float], now: float, propagator: Propagator, phi: Array) -> Iterator[tuple[Array, float]]:
-    """Yield ln p at some times, in section intervals, and ln of what truncation has changed in its probability."""
+    """Yield ln ρ at some times, in section intervals, and ln of what truncation has changed in its probability."""
     flow, change, same = propagator.flow, 0.0, 1e-9  # times that differ by less are equal
     interval, floor = flow.scene.section_interval, float(phi.max()) - _DEPTH
     with stage("density", unit="section intervals", total=math.ceil(ends[-1])):
@@ -184,7 +184,7 @@ def _checked_times(intervals: Sequence[float]) -> tuple[float, ...]:
 
 
 def _start(grid: DensityGrid, start: Any) -> Array:
-    """ln p at the start, of probability 1."""
+    """ln ρ at the start, of probability 1."""
     if isinstance(start, Attractor):
         corners, box = start.points[:, :2], None
     else:

@@ -36,7 +36,7 @@ _ACCEPTED = 0.1  # error of ln rate, above which a finding reports it
 class SGCM(RateAnalyzer):
     """Quasi-stationary densities and exit rates at finite noise, and activation energies as D → 0.
 
-    The density p on the section is carried from section to section as φ = ln p: along the exact flow, and by diffusion
+    The density ρ on the section is carried from section to section as φ = ln ρ: along the exact flow, and by diffusion
     of the velocity in closed form (see `vibrokit.kernels.log_density`). Tails are as exact as the maximum, at any
     depth. States that have left are put back into the core of their attractor, so that the density is stationary. The
     exit rate follows from this density and the committor, see the notes.
@@ -204,7 +204,7 @@ def _data(problem: ExitProblem, solver: DensitySolver, solved: list[AtIntensity]
                 ("intensity_index",), np.array([one.density.drift for one in solved]),
                 {"long_name": "relative change of probability in a section interval by truncation", "units": "1"},
             ),
-            "quasi_potential": (("node_x", "node_v"), potential, {"long_name": "-D ln p", "units": "m2 s-3"}),
+            "quasi_potential": (("node_x", "node_v"), potential, {"long_name": "-D ln ρ", "units": "m2 s-3"}),
             "rate_steps": ((), solver.steps, {"long_name": "how often noise acts in a section interval"}),
         },
         {

@@ -30,7 +30,7 @@ class Kind(StrEnum):
     ARRHENIUS = "arrhenius", "ΔU by Arrhenius fit"
     """The slope of a straight line through all ln τ against 1/D (m² s⁻³); its interval is one for ΔU."""
     BARRIER = "barrier", "barrier at the saddle"
-    """−D ln p at the lowest saddle above its minimum at noise D (m² s⁻³); it differs from ΔU by the order of D."""
+    """−D ln ρ at the lowest saddle above its minimum at noise D (m² s⁻³); it differs from ΔU by the order of D."""
     LOG_TIME = "log-time", "ln τ (τ in s)"
     """ln τ at noise D, τ in s."""
     SLOPE = "slope", "slope d ln τ/d(1/D)"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_LOWEST = -1e6  # in place of −inf where ln p is interpolated
+_LOWEST = -1e6  # in place of −inf where ln ρ is interpolated
 
 
 @documented
@@ -42,7 +42,7 @@ class StationaryDensity(metaclass=Constructed):
 
     intensities: Annotated[Array, "noise intensities D (m² s⁻³), descending"]
     log_weights: Annotated[Array, "ln of the weight of the density of each attractor, shape (intensities, attractors)"]
-    log_density: Annotated[Array, "ln p at the nodes; −inf where it is not resolved, shape (intensities, nx, nv)"]
+    log_density: Annotated[Array, "ln ρ at the nodes; −inf where it is not resolved, shape (intensities, nx, nv)"]
     x: Annotated[Array, "nodes at equal distances (m)"]
     v: Annotated[Array, "nodes at equal distances (m s⁻¹)"]
     section: Annotated[Section, "attractors and saddles"]
@@ -80,14 +80,14 @@ class StationaryDensity(metaclass=Constructed):
 
     @property
     def quasi_potential(self) -> xarray.DataArray:
-        """−D ln p (m² s⁻³), 0 at its minimum, over (intensity, x, v); infinite where p is not resolved."""
+        """−D ln ρ (m² s⁻³), 0 at its minimum, over (intensity, x, v); infinite where ρ is not resolved."""
         potential = -self.intensities[:, None, None] * self.log_density
         potential -= potential.min(axis=(1, 2), keepdims=True)
         return self._over_section(potential, "quasi_potential")
 
     @called
     def barrier(self, source: int | str) -> xarray.DataArray:
-        """Return −D ln p at the lowest point of the saddles, above that of an attractor, over intensity (m² s⁻³).
+        """Return −D ln ρ at the lowest point of the saddles, above that of an attractor, over intensity (m² s⁻³).
 
         Near a saddle the density is the sum of those of the states on both sides. `SGCMResult.barrier` has that of one
         state alone, which is higher.
@@ -113,7 +113,7 @@ class StationaryDensity(metaclass=Constructed):
     def plot(
         self, ax: Any = None, intensity: float | None = None, paths: Sequence[ArrayLike] = ()
     ) -> QuasiPotentialArtists:
-        """Draw −D ln p with all attractors and saddles; see `vibrokit.plots.quasi_potential.quasi_potential_map`.
+        """Draw −D ln ρ with all attractors and saddles; see `vibrokit.plots.quasi_potential.quasi_potential_map`.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class StationaryDensity(metaclass=Constructed):
 
 
 def _on_one_grid(result: SGCMResult, nodes: tuple[int, int]) -> tuple[Array, Array, Array]:
-    """Nodes at equal distances over all regions, and ln p there, shape (intensities, attractors, nx, nv)."""
+    """Nodes at equal distances over all regions, and ln ρ there, shape (intensities, attractors, nx, nv)."""
     data = result.data
     axes = {axis: data[f"density_{axis}"].values for axis in ("x", "v")}
     x, v = (

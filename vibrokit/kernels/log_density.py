@@ -1,11 +1,11 @@
-"""One step of the Fokker–Planck equation for φ = ln p on the nodes of a grid in (x, v).
+"""One step of the Fokker–Planck equation for φ = ln ρ on the nodes of a grid in (x, v).
 
 A step is the flow without noise, ``φ(F(y)) = φ(y) − ln |det F′(y)|``, followed by diffusion in v. Both are exact where
 φ is a quadratic form: the flow interpolates with quintics, and the diffusion is a Gaussian integral in closed form. So
 densities of e⁻¹⁰⁰⁰ are as exact as those near the maximum, because no density is added to a larger one.
 
 Where φ is not smooth on the scale of the nodes (edges of sets that absorb, ridges where two paths meet) polynomials
-would oscillate. There p, not ln p, is interpolated linearly at jumps, curvatures of ridges are limited as in
+would oscillate. There ρ, not ln ρ, is interpolated linearly at jumps, curvatures of ridges are limited as in
 essentially non-oscillatory schemes (Harten et al., J. Comput. Phys. 71, 231, 1987), and diffusion is a quadrature of
 that interpolation. At jumps it is a sum over nodes, which has no overshoot. Such a sum is wrong on steep slopes if the
 spread is below a node spacing: on hertz-0.570 at D = 2e-5, 200² nodes, it made ln of the mean exit time from hammering
@@ -37,7 +37,7 @@ The trapezoidal rule is exact to 1e-4 there, and its errors change sign from nod
 """
 SMOOTH, ROUGH, EMPTY = 0, 1, 2
 """What a quintic would reach: a smooth φ, a rough one, or none above the floor."""
-_JUMP = 3.0  # in φ between neighbouring nodes: beyond it p, not ln p, is interpolated linearly if φ is rough
+_JUMP = 3.0  # in φ between neighbouring nodes: beyond it ρ, not ln ρ, is interpolated linearly if φ is rough
 _NEGLIGIBLE = 40.0  # in the exponent: e⁻⁴⁰ of a sum is less than its rounding errors
 _UNDERFLOW = 600.0  # in the exponent: sums over a row are taken relative to its maximum, in floating point
 _SMALLEST = 1e-280  # sums below it may have lost terms to underflow
@@ -216,7 +216,7 @@ def _sum_row(
 ) -> None:
     """Diffusion at the wanted nodes as sums over the nodes from first to last, where φ is `least` or more.
 
-    p is 0 elsewhere.
+    ρ is 0 elsewhere.
     `weights` are kept between rows; `of` has the spread that they belong to, the matched one and their sum.
     """
     nv = len(row)
@@ -306,7 +306,7 @@ def _closed_row(
             out[j] = row[j]
             summed[j] = False
         elif low <= j <= high and spread <= WIDEST and not (rough[j - 1] or rough[j]):
-            narrowing = 1.0 - curvatures[j]  # less than this only where p has a cusp below the spread
+            narrowing = 1.0 - curvatures[j]  # less than this only where ρ has a cusp below the spread
             summed[j] = narrowing < 0.3
             if abs(curvatures[j]) > _SERIES and not summed[j]:
                 slope = (8.0 * (row[j + 1] - row[j - 1]) - (row[j + 2] - row[j - 2])) / 12.0

@@ -101,7 +101,7 @@ def density_map(x: ArrayLike, v: ArrayLike, density: ArrayLike, *, ax: Axes | No
     """
     axes = axes_or_new(ax)
     image = axes.pcolormesh(x, v, np.transpose(density), cmap="magma_r", shading="nearest", rasterized=True)
-    axes.figure.colorbar(image, ax=axes, label=r"density $p$ (s m$^{-2}$)")
+    axes.figure.colorbar(image, ax=axes, label=r"density $\rho$ (s m$^{-2}$)")
     phase_plane(axes)
     return DensityArtists(axes, image)
 

@@ -93,7 +93,7 @@ def _of_exit_times(result: MFETResult) -> Iterator[Drawing]:
 @_drawings.register
 def _of_densities(result: SGCMResult) -> Iterator[Drawing]:
     for label, name in enumerate(result.names):
-        yield f"Density at {name}, as −D ln p at the least noise intensity.", partial(result.plot, source=label)
+        yield f"Density at {name}, as −D ln ρ at the least noise intensity.", partial(result.plot, source=label)
 
 
 @_drawings.register

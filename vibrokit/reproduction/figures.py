@@ -65,7 +65,7 @@ def _of_scene(scene: str, known: dict[str, Record]) -> Iterator[Figure]:
         sampled = partial(_displacements, osc, density, structure, stationary)
         yield Figure(6, scene, f"Density of displacement at {at}, and a simulation from the same shares.", sampled)
         yield Figure(7, scene, f"Stationary density at {at}.", lambda: _density(stationary()))
-        yield Figure(8, scene, f"Quasi-potential −D ln p at {at}.", lambda: stationary().plot())
+        yield Figure(8, scene, f"Quasi-potential −D ln ρ at {at}.", lambda: stationary().plot())
     if isinstance(least, LeastActionResult) and isinstance(times, MFETResult):
         caption = "Mean exit times; lines have the published slopes."
         yield Figure(9, scene, caption, partial(_times, scene, times, least))

@@ -134,7 +134,7 @@ def _verdict(one: Published, known: dict[str, Record]) -> Verdict | None:
         case Method.DENSITY if isinstance(density := of_both(known, "density"), SGCMResult):
             intensity = paper()["density"]["intensity"]
             value = float(StationaryDensity.of(density).barrier(energy.source).sel(intensity=intensity))
-            error = intensity * max(rate.log_error for rate in density.rates)  # ln p is the sum of both states' parts
+            error = intensity * max(rate.log_error for rate in density.rates)  # ln ρ is the sum of both states' parts
             return of_density(one, value, error, energy.value, intensity)
         case Method.EXIT_TIMES if isinstance(times, RatedResult):
             fit = total_fit(times, energy)

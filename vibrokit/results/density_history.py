@@ -29,7 +29,7 @@ class DensityHistory(Record):
     times: Annotated[Array, "since the start, which is on a section (s)"]
     x: Annotated[Array, "nodes (m), closer where the oscillator is stiffer"]
     v: Annotated[Array, "nodes (m s⁻¹)"]
-    log_density: Annotated[Array, "ln p (p in s m⁻²), NaN where it is not resolved, shape (times, nx, nv)"]
+    log_density: Annotated[Array, "ln ρ (ρ in s m⁻²), NaN where it is not resolved, shape (times, nx, nv)"]
     mass: Annotated[Array, "probability on the nodes: 1, less what has left the region, and truncation errors"]
 
     @property
@@ -81,7 +81,7 @@ class DensityHistory(Record):
         """Return the arrays with dimensions, coordinates, units and long names."""
         return xarray.Dataset(
             {
-                "log_density": (("time", "x", "v"), self.log_density, {"long_name": "ln p", "units": "1"}),
+                "log_density": (("time", "x", "v"), self.log_density, {"long_name": "ln ρ", "units": "1"}),
                 "mass": (("time",), self.mass, {"long_name": "probability on the nodes", "units": "1"}),
             },
             {

@@ -22,12 +22,12 @@ class SGCMResult(RatedResult):
 
     `data` has, along ``source``:
 
-    - ``log_density`` over (``intensity_index``, ``density_node_x``, ``density_node_v``), ln p while probability leaves,
+    - ``log_density`` over (``intensity_index``, ``density_node_x``, ``density_node_v``), ln ρ while probability leaves,
       of mass 1, NaN where it is not resolved; ``density_x`` and ``density_v`` are the nodes, which are closer in x
       where the oscillator is stiffer;
     - ``log_committor`` over (``intensity_index``, ``exit_index``, ``density_node_x``, ``density_node_v``), NaN where
       the density is too small to matter, and in the core of the attractor, where it is 0;
-    - ``quasi_potential``, −D ln p at the least intensity, 0 at its minimum, on nodes at equal distances;
+    - ``quasi_potential``, −D ln ρ at the least intensity, 0 at its minimum, on nodes at equal distances;
     - ``log_rate`` and ``log_rate_error`` over (``intensity_index``, ``exit_index``), with ``rate_target`` and
       ``rate_intensity``;
     - ``mass_drift`` over ``intensity_index``, the probability that truncation errors add in a section interval.
@@ -37,7 +37,7 @@ class SGCMResult(RatedResult):
     refined_by: ClassVar[str] = "raise nodes"
 
     def barrier(self, source: int | str) -> xarray.DataArray:
-        """Return −D ln p at the lowest point of the saddles, above the minimum, over intensity (m² s⁻³).
+        """Return −D ln ρ at the lowest point of the saddles, above the minimum, over intensity (m² s⁻³).
 
         This is the activation energy as the WKB approximation has it at finite noise. It differs from the limit D → 0
         by the prefactors, of the order of D; `Result.energy` has the limit.
@@ -108,7 +108,7 @@ class SGCMResult(RatedResult):
 
     @called
     def plot(self, ax: Any = None, source: int | str | None = None) -> QuasiPotentialArtists:
-        """Draw −D ln p at the least intensity; see `Result.plot_quasi_potential`."""
+        """Draw −D ln ρ at the least intensity; see `Result.plot_quasi_potential`."""
         return self.plot_quasi_potential(source, ax)
 
 

@@ -1,1 +1,1 @@
-"""Stochastic generalized cell mapping on ln p: densities on the section, and rates of exit."""
+"""Stochastic generalized cell mapping on ln ρ: densities on the section, and rates of exit."""

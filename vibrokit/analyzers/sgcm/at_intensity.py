@@ -74,7 +74,7 @@ class AtIntensity:
 
     @property
     def log_density(self) -> Array:
-        """ln p; NaN where it is not resolved, because it is at the floor."""
+        """ln ρ; NaN where it is not resolved, because it is at the floor."""
         return resolved(self.density.phi)
 
     @property
@@ -85,9 +85,9 @@ class AtIntensity:
         return self.grid.mass(self.density.phi, outermost)
 
     def begun(self, grid: DensityGrid, intensity: float) -> tuple[Array, dict[int, Array]]:
-        """Return ln p and, by target, ln of the committor to begin iteration from on another grid, at less noise.
+        """Return ln ρ and, by target, ln of the committor to begin iteration from on another grid, at less noise.
 
-        The shape of −D ln p and of −D ln c depends little on D. Iteration starts from an underestimate: a deficit fills
+        The shape of −D ln ρ and of −D ln c depends little on D. Iteration starts from an underestimate: a deficit fills
         faster than an excess drains, which may stay near a saddle for long. So depths grow as D^−1.1.
         """
         ratio = (self.intensity / intensity) ** 1.1  # above the prefactors' share in hertz-0.570 at D = 1e-5

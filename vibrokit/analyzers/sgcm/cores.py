@@ -35,7 +35,7 @@ class CoreSets:
 
     own: Array  # of the attractor that is left
     others: Mapping[int, Array]  # by label: cores and cells committed to them, or basins; empty if position decides
-    entry: Array  # ln p, up to a constant, with which what has left is put back; −∞ outside the own core
+    entry: Array  # ln ρ, up to a constant, with which what has left is put back; −∞ outside the own core
     outlet: int | None  # target of what leaves by position, at any time; None if nothing does
     committed: Array  # of each cell, what absorbs because of the basin that it is in
 
@@ -72,7 +72,7 @@ class Cores:
         return CoreSets(own, others, entry, outlet, committed)
 
     def start(self, grid: DensityGrid, intensity: float) -> Array:
-        """Return ln p, up to a constant, of normal distributions around the points of the attractor."""
+        """Return ln ρ, up to a constant, of normal distributions around the points of the attractor."""
         ellipses = core_of(self.problem, self.problem.attractor, intensity, resolved=grid.local_spacing)
         return -0.5 * nearest(grid.nodes, *ellipses, self.problem.turn)
 

@@ -189,7 +189,7 @@ def _aligned(low: float, high: float, nodes: int, faces: Array) -> Array:
 
 
 def resolved(phi: Array) -> Array:
-    """Return ln p, NaN where it is not resolved, because it is at the floor or up to 2 above it.
+    """Return ln ρ, NaN where it is not resolved, because it is at the floor or up to 2 above it.
 
     What is cut at 1 above the floor leaves an edge that is a little higher.
     """

@@ -1,4 +1,4 @@
-"""Propagator: carries ln p on a grid from section to section, and expected values back."""
+"""Propagator: carries ln ρ on a grid from section to section, and expected values back."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NO_WEIGHT = np.empty((0, 0))
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Propagator:
-    """Carries φ = ln p over section intervals, by turns along the exact flow and by diffusion."""
+    """Carries φ = ln ρ over section intervals, by turns along the exact flow and by diffusion."""
 
     flow: DensityFlow
     intensity: float  # D (m² s⁻³)
@@ -49,7 +49,7 @@ class Propagator:
 
     @cached_property
     def _weight(self) -> Array:
-        """ln a: with noise that depends on the state, a p diffuses as p does with constant noise (Itô)."""
+        """ln a: with noise that depends on the state, a ρ diffuses as ρ does with constant noise (Itô)."""
         if np.ptp(self.flow.amplitude) == 0:
             return _NO_WEIGHT
         return np.log(np.maximum(self.flow.amplitude, 1e-300))
@@ -88,7 +88,7 @@ class Propagator:
     def backward_legs(self, phi: Array, least: float, kept: Sequence[Array]) -> list[Leg]:
         """Return the legs that carry an expected value back, the last one first, at the nodes that matter.
 
-        That is where ln p, which is `phi` on the section, exceeds `least` at its time, and in the cells of some cores.
+        That is where ln ρ, which is `phi` on the section, exceeds `least` at its time, and in the cells of some cores.
         Elsewhere nothing is computed.
         """
         reached = [phi, *(later for _, later, _ in self._carried(self.flow.legs, phi, self._weight, least))]

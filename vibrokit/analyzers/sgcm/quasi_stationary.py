@@ -25,9 +25,9 @@ from vibrokit.analyzers.sgcm.density_grid import DensityGrid
 from vibrokit.analyzers.sgcm.propagator import Propagator
 from vibrokit.progress import advance, stage
 
-_BELOW = 15.0  # in ln p: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it
+_BELOW = 15.0  # in ln ρ: the floor lies that far below the density that leaves, so that it adds e⁻¹⁵ of it
 _DEEPER = 20.0  # in ln c: the floor lies that far below the rate
-_RELEVANT = 14.0  # in ln p below the density that leaves: paths through less of it add e⁻¹⁴ of the rate
+_RELEVANT = 14.0  # in ln ρ below the density that leaves: paths through less of it add e⁻¹⁴ of the rate
 _RAREST = 35.0  # in ln rate: exits that are rarer than the most frequent one by more are not resolved
 
 Array = NDArray[np.float64]
@@ -81,11 +81,11 @@ class QuasiStationary:
 
     propagator: Propagator
     cores: CoreSets
-    phi: Array  # ln p on the section; its probability is 1
-    highest: Array  # largest ln p at each node over the last section interval
+    phi: Array  # ln ρ on the section; its probability is 1
+    highest: Array  # largest ln ρ at each node over the last section interval
     log_rates: Mapping[int, float]  # by target: ln of the probability that leaves in one section interval
     in_core: Array  # ln of the probability that is in the own core, or has been put back there; −∞ elsewhere
-    level: float  # ln p where most of it leaves
+    level: float  # ln ρ where most of it leaves
     change: float  # error of the largest rate's logarithm that iteration leaves
     converged: bool  # whether iteration has ended by itself
     drift: float  # relative change of the probability in one section interval by truncation errors
@@ -98,7 +98,7 @@ class QuasiStationary:
 
     @property
     def top(self) -> float:
-        """ln p where most of it leaves, or at the maximum if that is less."""
+        """ln ρ where most of it leaves, or at the maximum if that is less."""
         return min(self.level, float(self.highest.max()))
 
     def among(self, cores: CoreSets) -> QuasiStationary:
@@ -112,7 +112,7 @@ class QuasiStationary:
 def quasi_stationary(
     propagator: Propagator, start: Array, cores: CoreSets, convergence: Convergence
 ) -> QuasiStationary:
-    """Iterate from ln p at the start, an array (nx, nv), until the rates stay the same."""
+    """Iterate from ln ρ at the start, an array (nx, nv), until the rates stay the same."""
     grid, rates = propagator.grid, list[float]()
     phi, entry = start - grid.mass(start), cores.entry - grid.mass(cores.entry)
     floor = float(phi.max()) - 2 * _BELOW
@@ -150,7 +150,7 @@ def _absorb(
 ) -> tuple[float, dict[int, float], dict[int, float]]:
     """Take what has left out of φ, in place; `lost` is ln of what position took before.
 
-    Returns ln of all probability, and by target ln of the share that left and ln p where it left.
+    Returns ln of all probability, and by target ln of the share that left and ln ρ where it left.
     """
     mass, log_rates, levels = grid.mass(phi), dict[int, float](), dict[int, float]()
     if cores.outlet is not None:

@@ -149,7 +149,7 @@ class DensitySolver:
     def _wanted(self, found: QuasiStationary, intensity: float) -> NDArray[np.bool_]:
         """The nodes that matter at an intensity, by a density at this or more noise.
 
-        They hold the density down to 12 below what leaves in ln p, and 3 more in units of a stronger noise, and the
+        They hold the density down to 12 below what leaves in ln ρ, and 3 more in units of a stronger noise, and the
         cores of other attractors; basins count only where the density is.
         """
         stronger = found.propagator.intensity
