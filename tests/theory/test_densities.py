@@ -8,7 +8,7 @@ D, zeta, w, t = sp.symbols("D zeta omega_n t", positive=True)
 
 
 def fokker_planck(density, drift, diffusion, state):
-    """−Σ∂(b p) + D/2 Σ∂∂(a p)."""
+    """−Σ∂(b ρ) + D/2 Σ∂∂(a ρ)."""
     change = -sum((b * density).diff(z) for b, z in zip(drift, state, strict=True))
     for i, first in enumerate(state):
         for j, second in enumerate(state):
@@ -17,7 +17,7 @@ def fokker_planck(density, drift, diffusion, state):
 
 
 def test_orders_of_the_wkb_form():
-    """p = z exp(−Ψ/D), with any drift, a constant diffusion matrix, and functions of time."""
+    """ρ = z exp(−Ψ/D), with any drift, a constant diffusion matrix, and functions of time."""
     state = (x, v)
     psi, z = sp.Function("Psi")(x, v, t), sp.Function("z")(x, v, t)
     drift = sp.Function("b1")(x, v, t), sp.Function("b2")(x, v, t)
@@ -46,7 +46,7 @@ def test_detailed_balance_leaves_no_term_of_the_transport_equation():
 
 @pytest.mark.parametrize("amplitude", [1 + q**2 / 3, sp.exp(q / 2)])
 def test_the_prefactor_of_noise_that_depends_on_the_state(amplitude):
-    """One dimension: p = σ⁻² exp(2/D ∫ b/σ²) carries no flux."""
+    """One dimension: ρ = σ⁻² exp(2/D ∫ b/σ²) carries no flux."""
     drift = -q + q**3 / 5
     exponent = sp.Function("F")(q)  # of which the derivative is b/σ²
     density = sp.exp(2 * exponent / D) / amplitude**2

@@ -64,7 +64,7 @@ def test_the_map_is_symplectic_where_the_covariance_is_symmetric():
 
 
 def test_multipliers_of_a_periodic_orbit_and_their_inverses():
-    """The forced linear oscillator: μ = exp(λT), M = exp(AT), and C from Lyapunov's equation."""
+    """The forced linear oscillator: μ = exp(λT), M = exp(AT), and Q from Lyapunov's equation."""
     zeta, omega = 0.05, 0.8
     osc = vk.Oscillator(
         natural_frequency=1.0, damping_ratio=zeta, excitations=(vk.Harmonic(0.1, omega),), noise=vk.WhiteNoise(1e-3)

@@ -1,7 +1,9 @@
 """The worked numbers of docs/theory/methods.rst."""
 
+import csv
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 import vibrokit as vk
 
 FACTOR = 0.2  # 4ζω_n
+DATA = Path(__file__).parents[2] / "docs" / "data"
 
 
 def potential(x):
@@ -24,8 +27,8 @@ def energies(direct):
     return np.array([[0, OUTER, direct], [MIDDLE, 0, MIDDLE], [direct, OUTER, 0]])
 
 
-def w_graphs(root):
-    """All maps of the other two states that lead to the root."""
+def trees(root):
+    """All maps of the other two attractors that lead to the root."""
     others = [one for one in range(3) if one != root]
     for ends in itertools.product(range(3), repeat=2):
         arrows = dict(zip(others, ends, strict=True))
@@ -41,7 +44,7 @@ def test_energies_of_three_wells():
 @pytest.mark.parametrize("direct", [math.inf, 0.1169217256])
 def test_weights_of_three_wells_by_hand(direct):
     costs = energies(direct)
-    sums = [min(sum(costs[one, end] for one, end in arrows.items()) for arrows in w_graphs(root)) for root in range(3)]
+    sums = [min(sum(costs[one, end] for one, end in arrows.items()) for arrows in trees(root)) for root in range(3)]
     assert sums == pytest.approx([OUTER + MIDDLE, 2 * OUTER, OUTER + MIDDLE])
     transitions = vk.Transitions(("L", "M", "R"), costs, costs.copy(), costs.copy())
     np.testing.assert_allclose(transitions.weights, [0, FACTOR / 3, 0], atol=1e-15)
@@ -50,16 +53,16 @@ def test_weights_of_three_wells_by_hand(direct):
     assert (first.source, first.energy) == (1, MIDDLE)
 
 
-def test_each_state_has_three_w_graphs():
-    assert [len(list(w_graphs(root))) for root in range(3)] == [3, 3, 3]
+def test_each_attractor_has_three_trees():
+    assert [len(list(trees(root))) for root in range(3)] == [3, 3, 3]
 
 
-def test_products_over_w_graphs_are_the_stationary_probabilities():
+def test_products_over_trees_are_the_stationary_probabilities():
     """The matrix-tree theorem, for any rates."""
     rates = np.random.default_rng(2).exponential(size=(3, 3))
     np.fill_diagonal(rates, 0.0)
     products = [
-        sum(math.prod(rates[one, end] for one, end in arrows.items()) for arrows in w_graphs(root)) for root in range(3)
+        sum(math.prod(rates[one, end] for one, end in arrows.items()) for arrows in trees(root)) for root in range(3)
     ]
     shares = np.array(products) / sum(products)
     np.testing.assert_allclose(shares * rates.sum(axis=1), shares @ rates, rtol=1e-12)
@@ -73,3 +76,21 @@ def test_a_chi_squared_sum_of_independent_errors_raises_false_alarms_as_often_as
     sums = (differences**2 / (errors**2 + 0.05**2)).sum(axis=1)
     alarms = (chi2.sf(sums, 3) < 0.01).sum()
     assert abs(alarms - 200) < 4 * math.sqrt(200)
+
+
+def rows(name):
+    """The rows of a table of results."""
+    lines = (DATA / name).read_text(encoding="utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+def test_errors_of_certified_paths_are_mostly_below_1e_8():
+    errors = [float(one["error"]) / float(one["energy"]) for one in rows("gallery.csv") if one["bound"] == "certified"]
+    assert np.mean(np.array(errors) < 1e-8) > 0.9
+
+
+def test_splitting_has_rates_up_to_16():
+    deepest = [one for one in rows("klein_kramers.csv") if float(one["ratio"]) == 16]
+    assert deepest
+    for one in deepest:
+        assert abs(float(one["mfet"]) - float(one["spectrum"])) < 3 * float(one["mfet_error"])

@@ -15,7 +15,7 @@ growth = -c / 2 + sp.sqrt(c**2 / 4 + top**2)
 
 
 def test_the_density_at_the_barrier_is_stationary():
-    """f of u = v − μ y, and f·exp(−E/Θ), with the potential −ω_b² y²/2 and D = 2cΘ."""
+    """η of u = v − ν y, and η·exp(−E/Θ), with the potential −ω_b² y²/2 and D = 2cΘ."""
     share = (1 + sp.erf(u * sp.sqrt(growth / (2 * c * temperature)))) / 2
     share = share.subs(u, v - (growth + c) * y)
     force = top**2 * y - c * v
@@ -36,7 +36,7 @@ def test_growth_and_damping_make_the_curvature():
 
 @pytest.mark.parametrize("damping", [0.05, 0.4, 3.0])
 def test_the_flux_over_the_saddle(damping):
-    """∫ v f(v) exp(−v²/2Θ) dv = Θ λ₊/ω_b."""
+    """∫ v η(v) exp(−v²/2Θ) dv = Θ λ_u/ω_b."""
     height, level = 1.3, 0.07
     rate = -damping / 2 + math.sqrt(damping**2 / 4 + height**2)
 
