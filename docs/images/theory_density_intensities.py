@@ -25,7 +25,7 @@ def draw(result):
         left.plot(x, height - np.nanmin(height), label=f"−D ln ρ, D = {level:g}")
     places = np.linspace(-2, 0, 200)
     exact = 4 * ZETA * (places**4 / 4 - places**2 / 2 + 0.25)
-    left.plot(places, exact, "k--", linewidth=1.2, label="Ψ = 4ζω_n E")
+    left.plot(places, exact, "k--", linewidth=1.2, label=r"$\Psi = 4\zeta\omega_n E$")
     left.set(xlim=(-1.7, 0.6), ylim=(-0.01, 0.32), xlabel="x, at v = 0", ylabel="m² s⁻³")
     left.legend(frameon=False, fontsize=9)
     right.plot(LEVELS, result.barrier("left-rest").values, "o", label="−D ln ρ, saddle less attractor")

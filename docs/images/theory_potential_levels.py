@@ -26,7 +26,7 @@ exact.plot(path.q[:, 0], path.q[:, 1], color="#c4007a", linewidth=0.9, label="ex
 exact.plot(-1, 0, "o", color="C0", markeredgecolor="white", label="attractor")
 exact.plot(0, 0, "X", color="black", markeredgecolor="white", markersize=8, label="saddle")
 exact.set(xlim=(-1.6, 0.2), xlabel="position $x$ (m)", ylabel=r"velocity $v$ (m s$^{-1}$)")
-exact.legend(loc="upper left", fontsize=8)
+exact.legend(loc="lower right", fontsize=8)
 exact.set_title(r"double well: $\Psi = 4\zeta\omega_n E$", fontsize=10)
 figure.colorbar(shades, ax=exact, label=r"$\Psi$ (m$^2$ s$^{-3}$)")
 
