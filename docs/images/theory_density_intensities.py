@@ -26,13 +26,23 @@ def draw(result):
     places = np.linspace(-2, 0, 200)
     exact = 4 * ZETA * (places**4 / 4 - places**2 / 2 + 0.25)
     left.plot(places, exact, "k--", linewidth=1.2, label=r"$\Psi = 4\zeta\omega_n E$")
-    left.set(xlim=(-1.7, 0.6), ylim=(-0.01, 0.32), xlabel="x, at v = 0", ylabel="m² s⁻³")
+    left.set(
+        xlim=(-1.7, 0.6),
+        ylim=(-0.01, 0.32),
+        xlabel="position $x$ (m), at $v$ = 0",
+        ylabel="−D ln ρ, Ψ (m² s⁻³)",
+    )
     left.legend(frameon=False, fontsize=9)
     right.plot(LEVELS, result.barrier("left-rest").values, "o", label="−D ln ρ, saddle less attractor")
     line = np.linspace(0, 0.055, 2)
     right.plot(line, 0.2 + line * math.log(2), "k--", linewidth=1.2, label="ΔU + D ln 2")
     right.axhline(0.2, color="0.6", linewidth=1)
-    right.set(xlim=(0, 0.055), ylim=(0.19, 0.245), xlabel="D", ylabel="barrier of the density")
+    right.set(
+        xlim=(0, 0.055),
+        ylim=(0.19, 0.245),
+        xlabel="noise intensity $D$ (m² s⁻³)",
+        ylabel="barrier of the density (m² s⁻³)",
+    )
     right.legend(frameon=False, fontsize=9)
     return figure
 

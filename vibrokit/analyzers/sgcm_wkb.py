@@ -37,9 +37,9 @@ class SGCM(RateAnalyzer):
     """Quasi-stationary densities and exit rates at finite noise, and activation energies as D → 0.
 
     The density ρ on the section is carried from section to section as φ = ln ρ: along the exact flow, and by diffusion
-    of the velocity in closed form (see `vibrokit.kernels.log_density`). Tails are as exact as the maximum, at any
-    depth. States that have left are put back into the core of their attractor, so that the density is stationary. The
-    exit rate follows from this density and the committor, see the notes.
+    of the velocity in closed form. Tails are as exact as the maximum, at any depth. States that have left are put back
+    into the core of their attractor, so that the density is stationary. The exit rate follows from this density and the
+    committor, see the notes.
 
     With `LeaveBasin`, a state has left when it is in the core of another attractor on the section: an ellipse with the
     shape and the standard deviations of the density there, or 2.5 node spacings where that is more; when it is in
