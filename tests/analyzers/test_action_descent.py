@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import long, slow
+from tests.layers import long
 from vibrokit.analyzers.paths.action_descent import descend_action
 from vibrokit.analyzers.paths.gauss_newton import gauss_newton
 from vibrokit.analyzers.paths.segment_propagator import SegmentPropagator
+
+pytestmark = pytest.mark.slow
 
 STIFF = vk.Hertz(1e5)  # at 0.5 m/s a contact lasts 0.03 s, and a piece 0.6 s or less
 OSC = vk.Oscillator(
@@ -28,7 +30,7 @@ def descended(start, end, intervals, pieces):
 @pytest.mark.parametrize(
     ("start", "end", "intervals"),
     [
-        slow((0.0, 0.55), (0.2, 0.3), 2), long((0.2, 0.5), (0.3, -0.3), 2),
+        ((0.0, 0.55), (0.2, 0.3), 2), long((0.2, 0.5), (0.3, -0.3), 2),
         long((0.0, 0.55), (0.3, -0.3), 3), long((0.2, 0.5), (0.0, 0.6), 3),
     ],
 )  # fmt: skip

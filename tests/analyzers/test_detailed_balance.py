@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vibrokit as vk
-from tests.layers import long
+from tests.layers import long, slow
 from vibrokit.analyzers.agreement import compared
 from vibrokit.analyzers.paths.detailed_balance import least_actions, with_paths
 from vibrokit.analyzers.paths.reversed_relaxation import reversed_relaxations
@@ -77,9 +77,13 @@ CLOSED = {
     "forced": (scene(WELLS, damping_ratio=0.1, excitations=(vk.Harmonic(0.1, 0.8),)), 0, None, {}),
     "nonlinear damping": (scene(vk.CustomSpring("x**3 - x + c*x**2*v", c=0.3)), 0, None, {}),
 }  # fmt: skip
+OTHERS = ("tilted, from the left", "a well behind another", "forced", "nonlinear damping")
 
 
-@pytest.mark.parametrize(("osc", "source", "exit_", "climbs"), CLOSED.values(), ids=CLOSED)
+@pytest.mark.parametrize(
+    ("osc", "source", "exit_", "climbs"),
+    [pytest.param(*case, id=name, marks=[pytest.mark.slow] * (name in OTHERS)) for name, case in CLOSED.items()],
+)
 def test_closed_forms(osc, source, exit_, climbs):
     _, found = least(osc, source, exit_)
     assert found == {target: pytest.approx(4 * ZETA * climb, rel=1e-9) for target, climb in climbs.items()}
@@ -150,7 +154,7 @@ def test_close_to_a_fold(distance):
     assert abs(energy.value - expected) <= max(energy.numerical_error, 1e-12 * expected)
 
 
-@pytest.mark.parametrize("region", [None, ((-1.0, 1.75), (-1.0, 1.0))], ids=["default", "given"])
+@pytest.mark.parametrize("region", [slow(None), ((-1.0, 1.75), (-1.0, 1.0))], ids=["default", "given"])
 def test_the_cheaper_of_two_saddles_of_one_target(region):
     """Escape over −1.3 costs less than over 1.5, whether the region contains it or not."""
     spring = vk.CustomSpring("x*(1.3 + x)*(1.5 - x)/1.95")

@@ -159,6 +159,7 @@ def test_v_below_a_path_tells_nothing_of_a_finer_graph_with_shorter_steps(finer,
     assert Evidence(ORBIT, (estimate(1, 1.0, 0.0),), graph).unresolvable == useless
 
 
+@pytest.mark.slow
 def test_without_a_saddle_the_action_plot_bounds_the_energies():
     """Of a Duffing oscillator; its certified energy was confirmed by direct minimization of the action."""
     osc = vk.Oscillator(

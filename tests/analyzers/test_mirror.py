@@ -8,7 +8,7 @@ import pytest
 import scipy.interpolate
 
 import vibrokit as vk
-from tests.layers import long, slow
+from tests.layers import long
 from vibrokit.analyzers.mirrored import mirrored
 from vibrokit.analyzers.paths.mirror import Mirror
 from vibrokit.analyzers.problem import ExitProblem
@@ -73,7 +73,8 @@ def test_the_second_well_has_the_mirror_image_of_the_quasi_potential(kind):
     np.testing.assert_allclose(found, wanted, rtol=0.05, atol=1e-4)
 
 
-@pytest.mark.parametrize("kind", ["forced", *map(slow, OTHERS)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["forced", *OTHERS])
 def test_only_a_symmetric_scene_has_mirror_images(kind):
     osc, structure = wells(kind)
     labels = [Mirror(ExitProblem(osc, structure, one, vk.LeaveBasin())).image for one in structure.attractors]
@@ -116,6 +117,7 @@ def test_one_way_out_of_a_state_that_is_its_own_image_gives_the_other():
     assert MirrorImages().propose(problem, found.branches) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [{"value": 1.001}, {"path": None}, {"bound": vk.Bound.EXACT}], ids=str)
 def test_an_attractor_whose_images_are_not_found_again_is_searched(change):
     osc, structure = wells("forced")

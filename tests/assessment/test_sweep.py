@@ -302,6 +302,7 @@ def test_bad_words_on_the_command_line(words, capsys):
     assert capsys.readouterr().err.startswith("vibrokit: ")
 
 
+@pytest.mark.slow
 def test_a_sweep_as_json(tmp_path, monkeypatch, capsys):
     """States along the frequency; without paths no energies."""
     monkeypatch.chdir(tmp_path)

@@ -12,6 +12,7 @@ import pytest
 from mpmath import mpf
 
 import vibrokit as vk
+from tests.layers import slow
 from vibrokit.kernels.kernel import kernel_for, theta_of
 from vibrokit.kernels.vector_field import VectorField
 from vibrokit.symbolic.flow_kind import Flow
@@ -242,6 +243,9 @@ def relative_errors(found, exact):
     return errors
 
 
+LAYERED = [name if name in ("hertz", "adhesive", "varied noise") else slow(name) for name in CASES]
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_lanes_without_noise_have_the_code_of_those_with_it(name):
     assert SceneText(CASES[name].scene, Flow.STATE).derivative == SceneText(CASES[name].scene, Flow.NOISY).derivative
@@ -271,7 +275,7 @@ def test_lanes_exactly_at_touch(name, flow):
             assert max(relative_errors(found, expected(free, flow, mpf(x), mpf(0.4)))) <= TOLERANCE
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", LAYERED)
 def test_located(name, tmp_path):
     """The form in which the caller says which stops push; the law is then taken as it is, pulling or not."""
     case, flow = CASES[name], Flow.HAMILTONIAN_VARIATIONAL
@@ -295,7 +299,7 @@ def test_located(name, tmp_path):
             assert abs(mpf(found[1]) - exact[1]) <= TOLERANCE * max(1, abs(exact[1]))  # cos(arccos) rounds, too
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", LAYERED)
 def test_vector_field(name):
     """b, its Jacobian and Hamilton's equations, at many states and one time; then at a time for each."""
     case, time = CASES[name], 7.7

@@ -19,6 +19,8 @@ from vibrokit.errors import StructureError
 from vibrokit.results.energy import ActivationEnergy, Bound, ExitPath
 from vibrokit.structure.scales import doublings_of
 
+pytestmark = pytest.mark.slow
+
 TILT, DAMPING, NODES = 0.36, 0.05, (60, 60)
 STEPS = 8
 
@@ -59,7 +61,6 @@ def steps():
     return STEPS * 2 ** doublings_of(problem().scene)
 
 
-@pytest.mark.slow
 def test_the_first_grids_hold_the_path_and_hardly_more():
     grids = coverage().first(steps(), NODES, 1)
     (path,) = {id(branch.path): branch.path for branch in branches()}.values()

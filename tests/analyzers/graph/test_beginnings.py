@@ -9,6 +9,8 @@ import vibrokit as vk
 from vibrokit.analyzers.graph.beginnings import beginnings
 from vibrokit.analyzers.problem import ExitProblem
 
+pytestmark = pytest.mark.slow
+
 OSC = vk.load_scene("double-well").replace({"damping_ratio": 0.3})
 GRAPH = vk.GraphSearch(nodes=(60, 60), steps_per_period=8)
 
@@ -30,7 +32,6 @@ def potential(problem):
     return GRAPH.search(problem).potential
 
 
-@pytest.mark.slow
 def test_they_end_where_the_path_ends_and_cost_as_much(problem, potential, energy):
     found = beginnings(problem, potential, energy)
     assert found
