@@ -221,7 +221,7 @@ def full_result() -> LeastActionResult:
         energy(1, 0, 1e-3, lower=5e-4, upper=np.inf, certificate=UNSURE, saddle=1, method="«graph» and polish"),
         energy(2, -1, 3e-4, lower=np.nan, path=spiral(3), bound=Bound.BRACKET, numerical_error=np.nan),
     )  # fmt: skip
-    branches = (*energies, energy(0, 1, 1.1e-4, path=spiral(5), saddle=1, certificate=CERTIFICATE))
+    branches = (*energies, energy(0, 1, 1.1e-4, path=spiral(5), saddle=1, certificate=CERTIFICATE, proposed_by="graph"))
     made = LeastActionResult(energies=energies, branches=branches, section=section(), **PROVENANCE)
     joined = joined_data({2: potential()}, made.names)
     return dataclasses.replace(made, data=joined, findings=(Finding.of(Code.NO_EXIT_FOUND, 1),))

@@ -253,6 +253,8 @@ FAULTS = {
     "action nan": replaced(action=math.nan),
     "5 times": lambda good: dataclasses.replace(good, times=good.times[:5]),
     "positive and equal": lambda good: dataclasses.replace(good, times=good.times**2),
+    "finite states": lambda good: dataclasses.replace(good, states=0 * good.states),
+    "states from the attractor": lambda good: dataclasses.replace(good, states=math.nan * good.states),
 }
 
 
@@ -263,6 +265,7 @@ def test_a_source_of_a_user_proposes_and_is_polished(structure):
     assert energy.value == pytest.approx(EXACT, rel=1e-6)
     assert energy.certificate is not None
     assert (energy.bound, energy.lower) == (Bound.UPPER, 0.0)  # nothing has excluded a cheaper path
+    assert energy.proposed_by == StraightLine.name
 
 
 @pytest.mark.parametrize("says", FAULTS)
@@ -273,6 +276,32 @@ def test_a_fault_of_a_source_is_a_finding_and_what_it_proposed_before_is_used(st
     (failed,) = (finding for finding in found.findings if finding.code is Code.METHOD_FAILED)
     assert failed.values["method"] == "others"
     assert says in failed.values["reason"]
+
+
+class Unnamed(Source):
+    """A source without a name, which proposes nothing."""
+
+    def propose(self, problem, polished):
+        return ()
+
+
+def test_a_source_without_a_name_has_that_of_its_class():
+    assert (Unnamed.name, StraightLine.name) == ("Unnamed", "straight lines")
+
+
+def test_the_sources_after_an_empty_one_give_the_path_of_a_proven_minimum():
+    """The energy is known beforehand, by detailed balance; its path is that of the relaxations."""
+    osc = vk.load_scene("double-well")
+    found = vk.find_structure(osc, cells=(40, 40), manifolds=False, saddles=True, rng=0)
+
+    class EmptyFirst(vk.LeastAction):
+        def sources(self, problem):
+            return [Unnamed(), *super().sources(problem)]
+
+    (energy,) = EmptyFirst(source=0).run(osc, found).energies
+    assert energy.value == pytest.approx(4 * osc.damping_ratio / 4, rel=1e-9)
+    assert energy.certificate is not None
+    assert energy.proposed_by == "reversed relaxation"
 
 
 TOLD = [Code.NOTHING_PROPOSED, Code.METHOD_FAILED]
@@ -304,6 +333,25 @@ class LeaveLeft(LeaveRegion):
 
     def bounds(self, osc):
         return np.array([[-0.5, np.inf], [-np.inf, np.inf]])
+
+
+@pytest.mark.parametrize("name", ["is_out", "beyond", "faces", "stop", "path_ends"])
+def test_a_region_with_a_test_of_its_own_is_refused(name):
+    """Exit paths would not follow it: a corner, x ≥ c and v ≥ w, had the energy of its faces."""
+    with pytest.raises(StructureError, match=name):
+        type("Corner", (LeaveRegion,), {name: lambda self, *given: None, "bounds": LeaveLeft.bounds})
+
+
+@pytest.mark.parametrize(
+    "given", [[[0.5, -0.5], [-1, 1]], [[-1, 1]], [-1, 1], [["low", 1], [-1, 1]], None, [[math.nan, 1], [-1, 1]]]
+)
+def test_bounds_that_are_no_rectangle_are_refused(structure, given):
+    class Wrong(LeaveRegion):
+        def bounds(self, osc):
+            return given
+
+    with pytest.raises(StructureError, match="Wrong: bounds must return"):
+        vk.LeastAction(source=0, exit=Wrong(), **SMALL).run(OSC, structure)
 
 
 def test_an_attractor_that_has_left_already_costs_nothing(structure):

@@ -87,6 +87,11 @@ class Evidence:
         return compared(self.attractor, self.branches, self.estimates, self.least_possible, shots)
 
     @cached_property
+    def attained(self) -> set[int]:
+        """Exits with a path that attains the proven minimum."""
+        return {target for target, state in self._states.items() if state is ExitState.ATTAINED}
+
+    @cached_property
     def exact(self) -> set[int]:
         """Exits that attain the proven minimum."""
         return {target for target, state in self._states.items() if state in (ExitState.ATTAINED, ExitState.BARRIER)}

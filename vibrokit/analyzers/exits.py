@@ -219,10 +219,20 @@ class LeaveRegion(Exit):
 
     For developers
     --------------
-    Write `bounds`; infinite bounds are no faces.
+    Write `bounds`; infinite bounds are no faces. Paths, simulations and densities all follow from it, so that a class
+    with a region of another shape, or another test, is refused with a StructureError.
     """
 
     by_position: ClassVar[bool] = True
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        for name in ("is_out", "beyond", "faces", "stop", "path_ends"):
+            if name in vars(cls):
+                raise StructureError(
+                    f"{cls.__name__} has its own {name}, which exit paths would not follow; write bounds alone, the "
+                    "rectangle in (x, v) that is left."
+                )
 
     @property
     def event(self) -> str:
@@ -245,6 +255,19 @@ class LeaveRegion(Exit):
     def faces(self, osc: Oscillator, structure: Structure, source: int) -> Array:
         """The bounds."""
         return np.asarray(self.bounds(osc), dtype=float)
+
+    def check_scene(self, osc: Oscillator) -> None:
+        """Raise StructureError if `bounds` returns no rectangle."""
+        given = self.bounds(osc)
+        try:
+            found = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            found = np.empty(0)
+        if found.shape != (2, 2) or not np.all(found[:, 0] <= found[:, 1]):
+            raise StructureError(
+                f"{type(self).__name__}: bounds must return ((least x, largest x), (least v, largest v)), got "
+                f"{shown(given)}."
+            )
 
     def stop(self, osc: Oscillator, structure: Structure, source: int) -> Stop:
         """Test the bounds."""

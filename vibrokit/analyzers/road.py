@@ -61,14 +61,14 @@ class ExitRoad:
     def run(self) -> Analysis:
         """Propose, polish and bound, until the end, until all exits are proven, or until the work is stopped."""
         with Stoppable("", self.problem.source) as work:
-            for source in self.sources:
+            for number, source in enumerate(self.sources, 1):
                 work.doing = source.name
                 self._take(source)
-                if self._is_over:
+                if self._is_over(self.sources[number:]):
                     break
             work.doing = "graph"
             for step in (self._refine, self._begin_otherwise):
-                if not self._is_over:
+                if not self._is_over():
                     step()
         self._findings += work.findings
         self._cut |= work.stopped
@@ -221,11 +221,12 @@ class ExitRoad:
         beyond = frozenset[int]() if solution is None else self._beyond
         return Evidence(self.problem.attractor, self._polished[0], solution, tuple(self._least), beyond)
 
-    @property
-    def _is_over(self) -> bool:
-        """Whether the work was stopped, or all exits attain the proven minimum."""
+    def _is_over(self, left: Sequence[Source] = ()) -> bool:
+        """Whether the work was stopped, or all exits have the proven minimum, with a path if a source left has one."""
         least = {each.target for each in self._least}
-        return self.stopped or (bool(least) and least <= self._evidence.exact)
+        evidence = self._evidence
+        proven = evidence.attained if any(source.attains for source in left) else evidence.exact
+        return self.stopped or (bool(least) and least <= proven)
 
     def _unpolished(self, evidence: Evidence) -> tuple[ActivationEnergy, ...]:
         """The action plot's energies of exits without a polished path; their errors take time, which may be over."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class Source(ABC):
     Attributes
     ----------
     name : str
-        Of the work, in findings: "the straight lines could not be used …".
+        Of the work, in findings: "the straight lines could not be used …"; by default the name of the class.
     searches : bool
         Whether it looks everywhere. The error of the only source that does is an error of the road.
     expected : bool
@@ -56,6 +56,10 @@ class Source(ABC):
     attains: ClassVar[bool] = False
     effort: Effort = Effort.SHOOT
     findings: tuple[Finding, ...] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.name = getattr(cls, "name", cls.__name__)
 
     @abstractmethod
     def propose(self, problem: ExitProblem, polished: Sequence[ActivationEnergy]) -> Iterable[Candidate]:
@@ -85,13 +89,18 @@ def check_proposal(candidate: Candidate, problem: ExitProblem) -> None:
         )
     if count < 2 or candidate.states.shape != (count, size) or momenta.shape != (count, size):
         raise StructureError(
-            f"a candidate has {count} times, states of shape {candidate.states.shape} and momenta of shape "
-            f"{momenta.shape}; all must be of at least two times, of {size} numbers each."
+            f"a candidate has {count} times, states of shape {candidate.states.shape} and momenta, if given, of "
+            f"shape {momenta.shape}; all must be of at least two times, of {size} numbers each."
         )
     steps = np.diff(candidate.times)
     if not np.all(steps > 0) or not np.allclose(steps, steps[0], rtol=1e-3):
         raise StructureError(
-            f"a candidate has steps of {shown(steps.min())} to {shown(steps.max())} s; they must be positive and equal."
+            f"a candidate has steps of {steps.min():g} to {steps.max():g} s; they must be positive and equal."
+        )
+    if not np.isfinite(candidate.states).all() or not np.ptp(candidate.states, axis=0).any():
+        raise StructureError(
+            f"a candidate goes from {shown(candidate.states[0])} to {shown(candidate.states[-1])}; it must lead by "
+            "finite states from the attractor to the exit."
         )
     if not candidate.action >= 0:
         raise StructureError(f"a candidate has the action {shown(candidate.action)}; it must be 0 or positive.")

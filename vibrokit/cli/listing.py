@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Iterator
 
+from vibrokit.analyzers.exits import Exit
 from vibrokit.parts.formula_part import FormulaPart
 from vibrokit.parts.parameter import Parameter
 from vibrokit.parts.part import Part
@@ -30,11 +32,16 @@ def list_names(options: argparse.Namespace) -> None:
 def _rows(group: Group) -> Iterator[tuple[str, str, str]]:
     kind = _PARTS.get(group)
     working = {} if kind is None else load_all(group, kind)
+    exits = {name: _fields(cls) for name, cls in load_all(group, Exit).items()} if group is Group.EXITS else {}
     for name, distribution in names(group):
         if kind is not None and name not in working:
             yield name, distribution, "cannot be loaded"  # a warning gives the reason
         else:
-            yield name, distribution, _parameters(working[name]) if kind is not None else ""
+            yield name, distribution, _parameters(working[name]) if kind is not None else exits.get(name, "")
+
+
+def _fields(cls: type[Exit]) -> str:
+    return ", ".join(field.name for field in dataclasses.fields(cls)) or "none"
 
 
 def _parameters(cls: type[Part]) -> str:

@@ -27,7 +27,7 @@ from vibrokit.results.sweep import Sweep
 _ATTRACTOR = ("label", "name", "kind", "period", "impacts", "points", "basin_fraction", "basin_fraction_error")
 _SADDLE = ("period", "points", "multipliers", "kind", "leads_to", "embedded")
 _ENERGY = ("source", "target", "method", "value", "lower", "upper", "bound", "numerical_error", "residual", "saddle",
-           "sensitivity", "sensitivity_error")  # fmt: skip
+           "proposed_by", "sensitivity", "sensitivity_error")  # fmt: skip
 _RATE = ("source", "target", "intensity", "value", "log_value", "log_error", "event", "method")
 
 
@@ -89,7 +89,7 @@ def sweep_data(one: Sweep) -> dict[str, Any]:
             "values": one.values,
             "intensities": one.intensity,
             "coexistence": [dataclasses.asdict(each) for each in one.coexistence],
-            "bifurcations": [_fields(each, ("kind", "value", "branch")) for each in one.states.bifurcations],
+            "bifurcations": [_fields(each, ("kind", "value", "branch", "side")) for each in one.states.bifurcations],
             "branches": [_branch(one, name) for name in one.names],
             "complete": one.complete,
             "findings": findings_data("sweep", one.findings, one.names),

@@ -74,7 +74,8 @@ def energy_table(record: Record, energies: Iterable[ActivationEnergy]) -> Table:
         errors = number_text(e.numerical_error, ".1e"), number_text(e.residual, ".1e")
         saddle = str(e.saddle) if e.saddle >= 0 else "–"
         value = f"{e.value:.{_digits(e)}g}"
-        rows.append((e.exit_between(record.names), value, ratio, *bounds, *errors, saddle, e.method))
+        method = f"{e.method} ({e.proposed_by})" if e.proposed_by else e.method
+        rows.append((e.exit_between(record.names), value, ratio, *bounds, *errors, saddle, method))
     return Table("energies", "Activation energies (m² s⁻³)", header, tuple(rows))
 
 

@@ -130,6 +130,7 @@ class ActivationEnergy(metaclass=Constructed):
     path: Annotated[ExitPath | None, "its path"] = dataclasses.field(default=None, repr=False)
     saddle: Annotated[int, Whole("place of the saddle that the path ends on; -1 for none", low=-1)] = -1
     certificate: Annotated[Certificate | None, _EVIDENCE] = None
+    proposed_by: Annotated[str, "source that proposed the polished path; empty without one"] = ""
     sensitivity: Annotated[Slopes, _SLOPES] = dataclasses.field(default_factory=dict, repr=False)
     sensitivity_error: Annotated[Slopes, _SLOPE_ERRORS] = dataclasses.field(default_factory=dict, repr=False)
 

@@ -112,7 +112,7 @@ class CandidatePolisher:
         others = [other for other in self.ends if other is not end]
         try:
             leg = self._solver.solve(end, candidate, effort, others, self._least((end,)))
-            self._add(SolvedPath.of(self.problem, (leg,)))
+            self._add(SolvedPath.of(self.problem, (leg,), candidate.finder))
         except StructureError as error:
             self._failed[end] += [candidate] if effort is Effort.FROM_ORBIT else []
             return str(error)

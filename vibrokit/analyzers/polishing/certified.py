@@ -92,6 +92,7 @@ def energies(
             numerical_error=error,
             path=solved.path,
             saddle=solved.end.saddle,
+            proposed_by=solved.finder,
             **known,
         )
         for target in solved.targets

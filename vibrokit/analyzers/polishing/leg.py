@@ -150,9 +150,10 @@ class SolvedPath:
 
     legs: tuple[Leg, ...]
     path: ExitPath  # between two legs p = 0 and the action is constant
+    finder: str  # the source that proposed it
 
     @classmethod
-    def of(cls, problem: ExitProblem, legs: Sequence[Leg]) -> SolvedPath:
+    def of(cls, problem: ExitProblem, legs: Sequence[Leg], finder: str) -> SolvedPath:
         """Return the path of some legs.
 
         Raises StructureError if a leg begins at an attractor that the saddle before does not lead to.
@@ -160,7 +161,7 @@ class SolvedPath:
         path = legs[0].path
         for before, after in itertools.pairwise(legs):
             path = _appended(path, _between(problem, before, after), after.path, problem.scene)
-        return cls(tuple(legs), path)
+        return cls(tuple(legs), path, finder)
 
     @property
     def end(self) -> PathEnd:

@@ -61,7 +61,7 @@ class PassingSearch:
                     with contextlib.suppress(StructureError):
                         leg = solver.solve(end, rest, Effort.DESCEND)
                         if first.action + leg.found.action <= TOLERANCES.worth * candidate.action:
-                            return SolvedPath.of(self._problem, (*first.legs, leg))
+                            return SolvedPath.of(self._problem, (*first.legs, leg), candidate.finder)
         return None
 
     def _splits(
