@@ -168,7 +168,7 @@ def layered(line):
 
 
 @pytest.mark.parametrize(
-    "line", map(layered, sorted({shlex.join(words) for page in PAGES for words in commands(page)}))
+    "line", [layered(line) for line in sorted({shlex.join(words) for page in PAGES for words in commands(page)})]
 )
 def test_commands_do_what_they_say(line, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
