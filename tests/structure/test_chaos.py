@@ -267,11 +267,12 @@ def test_exact_flight_and_fixed_steps_agree_on_its_exponent(hammered):
 # --- groups ---
 
 
+@pytest.mark.parametrize("size", [1.0, 1e6])  # of the motion, in tolerances of 0.01
 @pytest.mark.parametrize(("parameter", "groups"), [(2.5, [[0, 2, 3], [1, 4]]), (2.7, [[0, 1, 2, 3, 4]])])
-def test_two_chaotic_attractors_are_told_apart(parameter, groups):
+def test_two_chaotic_attractors_are_told_apart(parameter, groups, size):
     samples = [cubic(parameter, 2000, start) for start in (0.31, -0.29, 0.5, 0.72, -0.1)]
     if parameter < 2.598:  # a positive start may lead to the negative attractor
         signs = (1, -1, 1, 1, -1)
         samples = [sample * sign * np.sign(sample[0, 0]) for sample, sign in zip(samples, signs, strict=True)]
-    found = separate(samples, 0.01)
+    found = separate([size * sample for sample in samples], 0.01)
     assert [list(members) for members in found] == groups

@@ -236,20 +236,22 @@ def kind_of(estimate: LyapunovEstimate) -> str | None:
 def separate(samples: list[Array], tolerance: float) -> list[NDArray[np.int64]]:
     """Group samples (count, n) of motion by attractor; return the indices of each group, the largest group first.
 
-    Two samples overlap, and are of one attractor, if more than half the points of either lie within the tolerance, a
-    distance in (x, v), of the other. Groups that both overlap with a sample are one. A sample has the points of one
-    trajectory on the section, enough of them to be within the tolerance of one another.
+    Two samples overlap, and are of one attractor, if more than half the points of either are near the other: within the
+    tolerance, a distance in (x, v), or within twice the median distance of neighbours in either sample, because the
+    motion may be far larger than the region that the tolerance is for. Groups that both overlap with a sample are one.
+    A sample has the points of one trajectory on the section.
     """
-    groups: list[tuple[list[int], cKDTree]] = []
+    groups: list[tuple[list[int], cKDTree, float]] = []
     for index, sample in enumerate(samples):
         places = np.asarray(sample, dtype=float)[:, :2]
         tree = cKDTree(places)
-        met = [group for group in groups if _overlap(tree, group[1], tolerance)]
+        spacing = float(np.median(tree.query(places, k=2)[0][:, 1]))
+        met = [group for group in groups if _overlap(tree, group[1], max(tolerance, 2 * spacing, 2 * group[2]))]
         apart = [group for group in groups if not any(group is other for other in met)]
         members = [index, *(member for group in met for member in group[0])]
         together = cKDTree(np.concatenate([places, *(group[1].data for group in met)])) if met else tree
-        groups = [*apart, (members, together)]
-    found = [np.array(sorted(members), dtype=np.int64) for members, _ in groups]
+        groups = [*apart, (members, together, max([spacing, *(group[2] for group in met)]))]
+    found = [np.array(sorted(members), dtype=np.int64) for members, _, _ in groups]
     return sorted(found, key=lambda members: (-len(members), int(members[0])))
 
 
