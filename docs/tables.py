@@ -206,8 +206,9 @@ def _published(data: Path) -> Page:
         "within their errors. I is the state that hits the stops, N the state that runs clear of them.",
         table,
     )
-    columns = ("scene", "state", "method", "published", "here", "certified", "verdict")
-    return page + _grid(columns, ([row[column] for column in columns] for row in table.rows))
+    columns = ("scene", "state", "method", "published", "here", "reason")
+    rows = ([row[column].replace("– (– to –)", "–") for column in columns] for row in table.rows)
+    return page + _grid((*columns[:-1], "comparison"), rows)
 
 
 def _independent(data: Path) -> Page:

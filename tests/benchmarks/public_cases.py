@@ -44,18 +44,20 @@ class Case:
     checks: list[dict[str, Any]]
     region: Any = None
     limit: float = 300.0
+    stopped: bool = False  # whether the limit ended a search
     _structure: vk.Structure | None = None
 
     @property
     def structure(self) -> vk.Structure:
         if self._structure is None:
             self._structure = vk.find_structure(self.osc, region=self.region, time_limit=self.limit)
+            self.stopped |= not self._structure.complete
         return self._structure
 
     @property
     def cut(self) -> str:
         """What an answer lacks: shares and counts are of the starts that had settled."""
-        return "" if self._structure is None or self._structure.complete else "the search was stopped by its limit"
+        return "the search was stopped by its limit" if self.stopped else ""
 
     def attractor(self, near: Any) -> Any:
         """The attractor with the point nearest to a place, in units of the spread of all points."""
@@ -147,6 +149,7 @@ def bifurcations(case: Case, parameter: str, values: list[float], kind: str) -> 
     found = vk.continuation(
         case.osc, parameter, values, region=case.region, cells=(20, 20), starts=(12, 12), time_limit=case.limit
     )
+    case.stopped |= not found.complete
     return sorted(each.value for each in found.bifurcations if each.kind == kind)
 
 
