@@ -34,7 +34,7 @@ def test_list_has_every_name(capsys):
     assert capsys.readouterr().out.splitlines()[0] == f"scenes: {', '.join(bundled_scenes())}"
 
 
-def test_list_has_the_parameters_of_parts_and_of_nothing_else(capsys):
+def test_list_has_the_parameters_of_parts_and_the_fields_of_exits_alone(capsys):
     kinds = listed(capsys)
     assert kinds["contact laws"]["hertz"] == ["vibrokit", "stiffness k [m^(-1/2) s^-2]"]
     assert kinds["contact laws"]["custom"] == ["vibrokit", "formula in depth and rate as text, and its constants"]
@@ -44,6 +44,7 @@ def test_list_has_the_parameters_of_parts_and_of_nothing_else(capsys):
     assert kinds["noise models"]["state-dependent"][1].startswith(
         "intensity D [m^2 s^-3], amplitude in x and v as text"
     )
+    assert kinds["exits"]["leave-bounds"] == ["vibrokit", "x, v"]
     assert kinds["analyzers"]["mfet"] == kinds["records"]["mfet"] == ["vibrokit"]
 
 

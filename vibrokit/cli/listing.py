@@ -1,4 +1,4 @@
-"""vibrokit list: all that is registered, by name, and the parameters of each part."""
+"""vibrokit list: all that is registered, by name, the parameters of each part and the fields of each exit."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from vibrokit.scene_file import bundled_scenes
 from vibrokit.testing import KINDS
 from vibrokit.text_table import text_table
 
-_PARTS = {checks.group: checks.kind for checks in KINDS}
+_KINDS: dict[Group, type[Part] | type[Exit]] = {checks.group: checks.kind for checks in KINDS}
+_KINDS[Group.EXITS] = Exit
 
 
 def list_names(options: argparse.Namespace) -> None:
-    """Print all that is registered; of a part also its parameters, as ``name symbol [unit]``."""
+    """Print all that is registered; of a part also its parameters, as ``name symbol [unit]``, of an exit its fields."""
     print("scenes:", ", ".join(bundled_scenes()))
     rows = {group: tuple(_rows(group)) for group in Group}
     lines = iter(text_table([row for of_group in rows.values() for row in of_group]))
@@ -30,21 +31,19 @@ def list_names(options: argparse.Namespace) -> None:
 
 
 def _rows(group: Group) -> Iterator[tuple[str, str, str]]:
-    kind = _PARTS.get(group)
+    kind = _KINDS.get(group)
     working = {} if kind is None else load_all(group, kind)
-    exits = {name: _fields(cls) for name, cls in load_all(group, Exit).items()} if group is Group.EXITS else {}
     for name, distribution in names(group):
         if kind is not None and name not in working:
             yield name, distribution, "cannot be loaded"  # a warning gives the reason
         else:
-            yield name, distribution, _parameters(working[name]) if kind is not None else exits.get(name, "")
+            yield name, distribution, _described(working[name]) if kind is not None else ""
 
 
-def _fields(cls: type[Exit]) -> str:
-    return ", ".join(field.name for field in dataclasses.fields(cls)) or "none"
-
-
-def _parameters(cls: type[Part]) -> str:
+def _described(cls: type[Part] | type[Exit]) -> str:
+    """The parameters of a part, or the fields of an exit in the order of its arguments."""
+    if issubclass(cls, Exit):
+        return ", ".join(field.name for field in dataclasses.fields(cls)) or "none"
     of_formula = ("formula", "constants") if issubclass(cls, FormulaPart) else ()
     shown = [_shown(declared) for declared in cls._declared if declared.attribute not in of_formula]
     if issubclass(cls, FormulaPart):
