@@ -212,7 +212,7 @@ def test_any_executor_gives_the_same_bits(splitting, pool, structure):
         assert analyzer.run(WELL, structure, executor=executor).data.identical(alone.data)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_workers_of_dask_one_of_which_is_killed(structure):
     analyzer = vk.MFET(intensities=(0.022,), source=0, target_error=0.08, splitting=False, escapes=2)
     alone = analyzer.run(WELL, structure)

@@ -74,7 +74,7 @@ def test_the_second_well_has_the_mirror_image_of_the_quasi_potential(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["forced", *OTHERS])
+@pytest.mark.parametrize("kind", ["forced", *map(long, OTHERS)])
 def test_only_a_symmetric_scene_has_mirror_images(kind):
     osc, structure = wells(kind)
     labels = [Mirror(ExitProblem(osc, structure, one, vk.LeaveBasin())).image for one in structure.attractors]

@@ -123,6 +123,7 @@ def test_rates_of_a_double_well(damping):
     assert energy.value == pytest.approx(barrier, rel=0.01)
 
 
+@pytest.mark.long
 def test_transients_of_the_paper_s_scene_are_those_of_simulated_trajectories():
     """Of 20 000 trajectories, the distribution function is within 0.013 of the exact one in 99.8 % of cases."""
     osc, intervals = vk.load_scene("hertz-0.570").replace({"noise.intensity": 4e-4}), (1, 3, 10)

@@ -74,7 +74,7 @@ def test_the_first_contact_of_a_forced_linear_oscillator():
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_scene_given_by_stiffness_and_damping():
     """ΔU = cκ (b − f/κ)², the energy above with κ = ω_n² and c = 2ζω_n, by the numbers that the scene has."""
     stiffness, c, b, push = 1.7, 0.3, 0.5, 0.1
