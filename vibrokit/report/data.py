@@ -6,11 +6,10 @@ import contextlib
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibrokit.assessment.plausibility import Plausibility
 from vibrokit.comparison.reconciliation import Reconciliation
 from vibrokit.comparison.transitions import Transitions
 from vibrokit.comparison.verdicts import exit_name
@@ -23,6 +22,9 @@ from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.structure import Structure
 from vibrokit.results.sweep import Sweep
+
+if TYPE_CHECKING:  # a saved record is reported without SymPy and Numba
+    from vibrokit.assessment.plausibility import Plausibility
 
 _ATTRACTOR = ("label", "name", "kind", "period", "impacts", "points", "basin_fraction", "basin_fraction_error")
 _SADDLE = ("period", "points", "multipliers", "kind", "leads_to", "embedded")
