@@ -118,7 +118,7 @@ def wells(friction):
 
 
 @pytest.mark.parametrize(("friction", "right"), [long(0.0, 0.5), long(0.1, 0.47525), (0.3, 0.4280)])
-@pytest.mark.parametrize("source", [0, 1])
+@pytest.mark.parametrize("source", [0, long(1)])
 def test_graph_and_action_plot_alone_agree_within_their_errors(friction, right, source):
     """0.5 by detailed balance; the others by a boundary value problem of Hamilton's equations, ±3e-4."""
     (graph,) = vk.ActionGraph(source=source, nodes=(64, 64)).run(*wells(friction)).energies

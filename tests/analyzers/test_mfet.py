@@ -353,7 +353,7 @@ def test_scenes_that_are_refused():
         vk.MFET().run(silent, vk.find_structure(silent, cells=(20, 20), manifolds=False, rng=0))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_coloured_noise_of_short_correlation_acts_like_white_noise(structure):
     """The correlation time is 1/100 of the other times; what it changes in the rate is of that order."""
     slow = scene(damping_ratio=0.2, spring=vk.CubicSpring(linear=-1.0, cubic=1.0), noise=Coloured(0.05, 100.0))

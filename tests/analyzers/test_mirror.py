@@ -57,8 +57,8 @@ def test_the_second_well_has_the_energies_that_a_search_finds_there(kind):
     assert second.certificate.residual < 1e-9
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["forced", long("unforced")])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["forced", "unforced"])
 def test_the_second_well_has_the_mirror_image_of_the_quasi_potential(kind):
     """Around the second well it is what the graph finds there."""
     osc, structure = wells(kind)

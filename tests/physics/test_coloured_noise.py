@@ -59,7 +59,7 @@ def test_the_reference_itself(rate, energy):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate", [0.3, 1.0, 3.0, long(30.0), long(300.0)])
+@pytest.mark.parametrize("rate", [0.3, *map(long, (1.0, 3.0, 30.0, 300.0))])
 def test_first_contact_under_coloured_noise(rate):
     result = least(contact(vk.ColouredNoise(1e-3, rate)))
     (energy,) = result.energies
@@ -70,8 +70,8 @@ def test_first_contact_under_coloured_noise(rate):
     assert result.found(Code.NOT_SEARCHED)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("frequency", "zeta"), [long(1.0, 0.02), (0.5, 0.1), long(4.0, 0.3)])
+@pytest.mark.long
+@pytest.mark.parametrize(("frequency", "zeta"), [(1.0, 0.02), (0.5, 0.1), (4.0, 0.3)])
 def test_first_contact_under_a_narrow_band(frequency, zeta):
     (energy,) = least(contact(vk.FilteredNoise(1e-3, frequency, zeta))).energies
     assert energy.value == pytest.approx(0.5 / filtered(frequency, zeta)[0], rel=1e-8)

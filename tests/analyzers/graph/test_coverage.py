@@ -49,7 +49,7 @@ def test_grids_reach_beyond_the_region_where_a_known_path_does(which):
     assert energy.numerical_error < 0.05 * EXACT
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_where_memory_is_short_fewer_nodes_are_taken():
     search, many = vk.GraphSearch(nodes=(240, 240), max_memory_gib=0.05), vk.GraphSearch(nodes=(120, 120))
     found, fewer = search.search(problem("cuts the basin")), many.search(problem("cuts the basin"))
