@@ -207,8 +207,7 @@ def _published(data: Path) -> Page:
         table,
     )
     columns = ("scene", "state", "method", "published", "here", "reason")
-    rows = ([row[column].replace("– (– to –)", "–") for column in columns] for row in table.rows)
-    return page + _grid((*columns[:-1], "comparison"), rows)
+    return page + _grid((*columns[:-1], "comparison"), ([row[column] for column in columns] for row in table.rows))
 
 
 def _independent(data: Path) -> Page:
@@ -275,19 +274,13 @@ def _analyzers(data: Path) -> Page:
         "intensity of the scene.",
         table,
     )
-    sources = list(dict.fromkeys(row["source"] for row in table.rows))
-    of = {(row["analyzer"], row["source"]): row for row in table.rows}
-    rows = []
+    whole, *sources = dict.fromkeys(row["source"] for row in table.rows)  # the structure is that of all sources
+    by_analyzer: dict[tuple[str, str], list[str]] = {}
     for row in table.rows:
-        if row["source"] == sources[0]:  # the structure, of all sources
-            rows.append((row["analyzer"], row["quantity"], row["value"], row["seconds"], "", ""))
-        elif row["source"] == sources[1]:
-            cells = [row["analyzer"], row["quantity"]]
-            for source in sources[1:]:
-                one = of[row["analyzer"], source]
-                cells += [f"{one['value']} ± {one['error']}", one["seconds"]]
-            rows.append(tuple(cells))
-    heads = [head for source in sources[1:] for head in (source, "seconds")]
+        value = row["value"] if row["source"] == whole else f"{row['value']} ± {row['error']}"
+        by_analyzer.setdefault((row["analyzer"], row["quantity"]), []).extend((value, row["seconds"]))
+    heads = [head for source in sources for head in (source, "seconds")]
+    rows = ((*what, *cells, *[""] * (len(heads) - len(cells))) for what, cells in by_analyzer.items())
     return page + _grid(("analyzer", "quantity", *heads), rows)
 
 

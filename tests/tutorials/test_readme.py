@@ -43,15 +43,8 @@ def from_scripts():
 WRITTEN = [page for page in sorted(DOCS.glob("**/*.rst")) if not made_by_the_build(page)]
 PAGES = [README, *(page for page in WRITTEN if page.parent != DOCS / "scenes")]
 QUICK = ("list", "equations", "plausibility", "check")  # of the other commands the words are checked
-LONG = (
-    "assess",
-    "conformance-kit",
-    "density",
-    "exit-times",
-    "least-action",
-    "reconcile",
-    "structure",
-)  # their Python takes the longest
+# Their Python takes the longest.
+LONG = ("assess", "conformance-kit", "density", "exit-times", "least-action", "reconcile", "structure")
 
 
 def snippets(page, language):

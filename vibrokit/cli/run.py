@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import sys
 import traceback
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ from typing import Any
 
 from vibrokit.analyzers.analyzer import Analyzer
 from vibrokit.analyzers.settings import configured, named_exit, setting
+from vibrokit.cli.json_output import print_json
 from vibrokit.cli.long_work import Interrupts, check_targets, scene_stem, source_of
 from vibrokit.errors import VibrokitError
 from vibrokit.kernels.named import named_stepper
@@ -25,7 +25,7 @@ from vibrokit.report.text import record_text
 from vibrokit.results.atomic import save_figure
 from vibrokit.results.codes import Code
 from vibrokit.results.finding import Finding
-from vibrokit.results.record import Record, versions
+from vibrokit.results.record import Record
 from vibrokit.results.result import Result
 from vibrokit.results.stoppable import Stoppable
 from vibrokit.results.structure import Structure
@@ -197,8 +197,8 @@ def _print(outcome: Outcome, options: argparse.Namespace) -> None:
     if options.json:
         found = {"scene": options.scene, "complete": outcome.complete, **run_data(outcome.structure, outcome.results)}
         found["findings"] += findings_data("run", outcome.findings)
-        found |= {"files": {name: str(path) for name, path in outcome.files.items()}, "versions": versions()}
-        print(json.dumps({**found, "seed": options.seed, "seconds": outcome.seconds}, allow_nan=False))
+        files = {name: str(path) for name, path in outcome.files.items()}
+        print_json(**found, files=files, seed=options.seed, seconds=outcome.seconds)
     else:
         _print_records(outcome, options)
         print(f"{outcome.seconds:.1f} s; {_written(outcome)}.")

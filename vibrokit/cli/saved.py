@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 
+from vibrokit.cli.json_output import print_json
 from vibrokit.cli.long_work import check_targets
 from vibrokit.comparison.reconcile import reconcile
 from vibrokit.report.data import reconciliation_data
 from vibrokit.report.text import record_text
 from vibrokit.results.atomic import save_figure
 from vibrokit.results.files import load_result
-from vibrokit.results.record import versions
 
 
 def reconcile_files(options: argparse.Namespace) -> int:
@@ -21,7 +20,7 @@ def reconcile_files(options: argparse.Namespace) -> int:
     found = reconcile(*options.file, level=options.level)
     if options.json:
         files = [str(path) for path in options.file]
-        print(json.dumps({"files": files, **reconciliation_data(found), "versions": versions()}, allow_nan=False))
+        print_json(files=files, **reconciliation_data(found))
     else:
         print(record_text(f"Reconciliation of {', '.join(map(str, options.file))}", found))
     if options.output is not None:

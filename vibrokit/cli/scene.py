@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 from vibrokit.assessment.plausibility import plausibility
+from vibrokit.cli.json_output import print_json
 from vibrokit.report.data import plausibility_data
-from vibrokit.results.record import versions
 from vibrokit.scene_file import load_scene
 
 
@@ -21,7 +20,6 @@ def closed_forms(options: argparse.Namespace) -> None:
     """Print closed forms of a scene, and which of them are unusual."""
     found = plausibility(load_scene(options.scene))
     if options.json:
-        data = {"scene": options.scene, **plausibility_data(found), "versions": versions()}
-        print(json.dumps(data, allow_nan=False))
+        print_json(scene=options.scene, **plausibility_data(found))
     else:
         print(found)

@@ -1,4 +1,4 @@
-"""vibrokit check and trade: what the toolkit makes of a part, and of this machine."""
+"""vibrokit check and trade: test a part, and measure error against time on this machine."""
 
 from __future__ import annotations
 

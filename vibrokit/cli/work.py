@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +14,7 @@ from vibrokit.assessment.assessment import Assessment
 from vibrokit.assessment.durations import required_time, seconds_in
 from vibrokit.assessment.plausibility import plausibility
 from vibrokit.assessment.sweep import sweep
+from vibrokit.cli.json_output import print_json
 from vibrokit.cli.long_work import Interrupts, check_targets, scene_stem, source_of
 from vibrokit.errors import ParameterError, shown
 from vibrokit.report.assessment import Question, assessment_data, assessment_text
@@ -23,7 +22,6 @@ from vibrokit.report.data import sweep_data
 from vibrokit.report.text import record_text
 from vibrokit.reproduction.reproduce import PAGE, PUBLISHED, reproduce
 from vibrokit.results.atomic import save_figure
-from vibrokit.results.record import versions
 from vibrokit.scene_file import load_scene
 from vibrokit.structure.parameter_values import parameter_line
 
@@ -57,17 +55,13 @@ def assess_scene(options: argparse.Namespace) -> int:
 def _print_assessment(options: argparse.Namespace, found: Assessment) -> None:
     question = Question(options.mean_time, options.within)
     if options.json:
-        _print_json(options, assessment_data(found, question), found.seconds)
+        data = assessment_data(found, question)
+        print_json(scene=options.scene, **data, seed=options.seed, seconds=found.seconds)
     else:
         print(assessment_text(f"{options.scene}: which state lasts, and how long", found, question))
         if options.output is not None:
             print(f"written: {options.output}")
     sys.stdout.flush()
-
-
-def _print_json(options: argparse.Namespace, data: dict[str, Any], seconds: float) -> None:
-    whole = {"scene": options.scene, **data, "versions": versions(), "seed": options.seed, "seconds": seconds}
-    print(json.dumps(whole, allow_nan=False))
 
 
 def sweep_scene(options: argparse.Namespace) -> int:
@@ -99,7 +93,7 @@ def sweep_scene(options: argparse.Namespace) -> int:
         if options.output is not None:
             found.save(options.output)
         if options.json:
-            _print_json(options, sweep_data(found), found.seconds)
+            print_json(scene=options.scene, **sweep_data(found), seed=options.seed, seconds=found.seconds)
         else:
             print(record_text(f"{options.scene}: sweep", found, brief=not options.verbose))
             if options.output is not None:

@@ -83,7 +83,7 @@ def reconciliation_data(one: Reconciliation) -> dict[str, Any]:
 
 
 def sweep_data(one: Sweep) -> dict[str, Any]:
-    """Return where states exist along the parameter (SI units), and what is known of each branch at each value."""
+    """Return where branches exist (SI units), and their displacements, energies and mean times at each value."""
     return plain(
         {
             "parameter": dict(one.factors),

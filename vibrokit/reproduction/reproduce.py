@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
@@ -92,12 +93,17 @@ def _drawn(one: Figure, folder: Path) -> list[Picture | Sentences]:
         return [Sentences((f"{title} It could not be drawn: {error}",))]
 
 
+def _with_interval(one: Verdict) -> str:
+    value, lower, upper = (number_text(number, ".4g") for number in (one.value, one.lower, one.upper))
+    return value if math.isnan(one.value) else f"{value} ({lower} to {upper})"
+
+
 def verdict_table(found: list[Verdict]) -> Table:
     """Return a row for each published number: ours beside it, the certified one, and why they differ."""
     rows = tuple(
         (
             one.published.scene, one.published.state, str(one.published.method), f"{one.published.value:.4g}",
-            f"{number_text(one.value, '.4g')} ({number_text(one.lower, '.4g')} to {number_text(one.upper, '.4g')})",
+            _with_interval(one),
             number_text(one.certified, ".6g"), str(one.match),
             one.sentence,
         )

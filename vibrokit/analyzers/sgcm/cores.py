@@ -35,7 +35,7 @@ class CoreSets:
 
     own: Array  # of the attractor that is left
     others: Mapping[int, Array]  # by label: cores and cells committed to them, or basins; empty if position decides
-    entry: Array  # ln ρ, up to a constant, with which what has left is put back; −∞ outside the own core
+    entry: Array  # ln ρ, up to a constant, of states that have left and are put back; −∞ outside the own core
     outlet: int | None  # target of what leaves by position, at any time; None if nothing does
     committed: Array  # of each cell, what absorbs because of the basin that it is in
 
