@@ -73,7 +73,8 @@ def outputs(
 ):  # fmt: skip
     states = np.atleast_2d(np.asarray(states, dtype=float))
     count = len(states)
-    settings = np.array([tolerance, limit, cycle, 1.0, span, np.inf])
+    settings = np.array(vk.Order8(tolerance).settings(SCENE, interval))  # the driver reads as many as a stepper has
+    settings[1:6] = limit, cycle, 1.0, span, np.inf
     ended = advance_block(
         kernel, states, np.full(count, intervals), (theta() if values is None else values, 0.0, interval, settings),
         np.empty((count, 0), dtype=np.uint64), np.zeros(count, dtype=np.int64), Stop(region=region), visits, 1,
